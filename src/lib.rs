@@ -1,0 +1,3 @@
+//! How axons find their way.
+
+pub mod numerics;

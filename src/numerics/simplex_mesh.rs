@@ -124,11 +124,7 @@ impl<const D: usize> SimplexMesh<D> {
         let on_border = |slot: &usize| self.neighbours[*slot] == BORDER;
         (0..self.neighbours.len())
             .filter(on_border)
-            .map(|slot| BorderFacet {
-                cell: (slot / Self::STRIDE) as u32,
-                face: (slot % Self::STRIDE) as u8,
-                edge: 0,
-            })
+            .map(|slot| BorderFacet { cell: (slot / Self::STRIDE) as u32, face: (slot % Self::STRIDE) as u8, edge: 0 })
             .collect()
     }
 
@@ -271,12 +267,7 @@ fn cross<const D: usize>(a: &[f64; D], b: &[f64; D]) -> [f64; 3] {
 ///
 /// # Errors
 /// Those of [`SimplexMesh::new`], when a side or a count is not positive.
-pub fn structured_rectangle(
-    width: f64,
-    height: f64,
-    columns: usize,
-    rows: usize,
-) -> Result<SimplexMesh<2>, MeshError> {
+pub fn structured_rectangle(width: f64, height: f64, columns: usize, rows: usize) -> Result<SimplexMesh<2>, MeshError> {
     let vertex = |i: usize, j: usize| (j * (columns + 1) + i) as u32;
     let mut vertices = Vec::with_capacity((columns + 1) * (rows + 1));
     for j in 0..=rows {

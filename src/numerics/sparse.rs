@@ -7,8 +7,8 @@
 use std::sync::Arc;
 
 use faer::dyn_stack::{MemBuffer, MemStack};
-use faer::linalg::cholesky::ldlt::factor::LdltRegularization;
-use faer::linalg::cholesky::llt::factor::LltRegularization;
+use faer::linalg::cholesky::ldlt::factor::{LdltError, LdltRegularization};
+use faer::linalg::cholesky::llt::factor::{LltError, LltRegularization};
 use faer::sparse::linalg::cholesky::{
     LdltRef, LltRef, SymbolicCholesky, SymbolicCholeskyRaw, SymmetricOrdering, factorize_symbolic_cholesky,
     supernodal::SupernodalLdltRef,
@@ -82,9 +82,8 @@ impl SymmetricPattern {
             }
         }
         let structure = SymbolicSparseColMatRef::new_checked(unknowns, unknowns, &column_start, None, &rows);
-        let symbolic =
-            factorize_symbolic_cholesky(structure, Side::Lower, SymmetricOrdering::Amd, Default::default())
-                .map_err(|error| SparseError::Setup(format!("{error:?}")))?;
+        let symbolic = factorize_symbolic_cholesky(structure, Side::Lower, SymmetricOrdering::Amd, Default::default())
+            .map_err(|error| SparseError::Setup(format!("{error:?}")))?;
         Ok(Arc::new(Self { unknowns, column_start, rows, slots, local, symbolic }))
     }
 
@@ -200,12 +199,7 @@ impl SymmetricMatrix {
                 MemStack::new(&mut buffer(scratch)?),
                 Default::default(),
             )
-            .map_err(|error| match error {
-                faer::sparse::linalg::LltError::Numeric(
-                    faer::linalg::cholesky::llt::factor::LltError::NonPositivePivot { index },
-                ) => SparseError::NotPositiveDefinite { pivot: index },
-                other => SparseError::Setup(format!("{other:?}")),
-            })?;
+            .map_err(|LltError::NonPositivePivot { index }| SparseError::NotPositiveDefinite { pivot: index })?;
         Ok(Factor { pattern: Arc::clone(&self.pattern), values, kind: FactorKind::Cholesky })
     }
 
@@ -227,12 +221,7 @@ impl SymmetricMatrix {
                 MemStack::new(&mut buffer(scratch)?),
                 Default::default(),
             )
-            .map_err(|error| match error {
-                faer::sparse::linalg::LdltError::Numeric(
-                    faer::linalg::cholesky::ldlt::factor::LdltError::ZeroPivot { index },
-                ) => SparseError::Singular { pivot: index },
-                other => SparseError::Setup(format!("{other:?}")),
-            })?;
+            .map_err(|LdltError::ZeroPivot { index }| SparseError::Singular { pivot: index })?;
         Ok(Factor { pattern: Arc::clone(&self.pattern), values, kind: FactorKind::Ldlt })
     }
 }

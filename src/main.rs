@@ -1,2 +1,7 @@
-//! The command line.
-fn main() {}
+//! The program: the standard roster on the command line.
+
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    tropism::run(std::env::args_os(), tropism::systems::standard())
+}

@@ -1,0 +1,143 @@
+//! The command line: arguments in, exit code out.
+//!
+//! Exit codes: 0 done; 1 a fault while solving, running or writing; 2 a bad scenario or bad arguments.
+
+use crate::model::mechanism::Roster;
+use crate::scenario::load::{Loaded, Request};
+use crate::study::run::{RunError, folder_of, read, simulate, write_figure, write_json, write_results};
+use crate::study::seeds::{over_seeds, summarise};
+use crate::record::manifest::Manifest;
+use clap::Parser;
+use indicatif::{ProgressBar, ProgressStyle};
+use std::ffi::OsString;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+/// Simulates how axons find their way: runs a scenario and writes its results into out/<scene>/.
+#[derive(Debug, Parser)]
+#[command(name = "tropism", version, after_help = EXAMPLES)]
+struct Cli {
+    /// The scenario, a JSON file
+    scenario: PathBuf,
+    /// Leave a mechanism out, as if the scenario had no such block (repeatable)
+    #[arg(long, value_name = "NAME")]
+    without: Vec<String>,
+    /// Set one key, named by its JSON pointer (repeatable)
+    #[arg(long, value_name = "/POINTER=VALUE")]
+    set: Vec<String>,
+    /// Folder of the results [default: out/<scene>]
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Run N seeds, from the scenario's seed on, and report means with bootstrap intervals
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=100_000))]
+    seeds: Option<u64>,
+    /// Threads to use; results do not depend on it [default: all]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1024))]
+    threads: Option<u32>,
+}
+
+const EXAMPLES: &str = "Examples:
+  tropism scenarios/olfactory.json                       the complete model
+  tropism scenarios/olfactory.json --without chemotaxis  an ablation
+  tropism scenarios/olfactory.json --set /seed=7 --set /populations/olfactory/count=50
+  tropism scenarios/olfactory.json --seeds 20 --out out/olfactory-20";
+
+/// Runs the program with a roster of mechanisms: the whole of `main`, also for programs that add their own.
+pub fn run(arguments: impl IntoIterator<Item = impl Into<OsString> + Clone>, roster: Roster) -> ExitCode {
+    let cli = match Cli::try_parse_from(arguments) {
+        Ok(cli) => cli,
+        Err(error) => {
+            // Nothing can be done about a standard output that is gone.
+            let _ = error.print();
+            return ExitCode::from(if error.use_stderr() { 2 } else { 0 });
+        }
+    };
+    match on_threads(&cli, || execute(&cli, &roster)) {
+        Ok(code) => code,
+        Err(error) => {
+            eprintln!("error: {error}");
+            ExitCode::from(if matches!(error, RunError::Scenario(_)) { 2 } else { 1 })
+        }
+    }
+}
+
+fn on_threads<T: Send>(cli: &Cli, work: impl FnOnce() -> Result<T, RunError> + Send) -> Result<T, RunError> {
+    let threads = cli.threads.unwrap_or(0) as usize;
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(threads)
+        .build()
+        .map_err(|error| RunError::Internal(error.to_string()))?;
+    pool.install(work)
+}
+
+fn execute(cli: &Cli, roster: &Roster) -> Result<ExitCode, RunError> {
+    let request = Request { path: cli.scenario.clone(), without: cli.without.clone(), set: cli.set.clone() };
+    let loaded = read(&request, roster)?;
+    for hint in &loaded.hints {
+        eprintln!("hint: {hint}");
+    }
+    let folder = folder_of(cli.out.as_ref(), &loaded.scene.name);
+    let complete = match cli.seeds {
+        None => run_once(cli, roster, &loaded, &folder)?,
+        Some(count) => run_seeds(cli, roster, &loaded, &folder, count)?,
+    };
+    println!("results in {}", folder.display());
+    Ok(ExitCode::from(u8::from(!complete)))
+}
+
+fn run_once(cli: &Cli, roster: &Roster, loaded: &Loaded, folder: &std::path::Path) -> Result<bool, RunError> {
+    let bar = progress_bar();
+    let finished = simulate(loaded, roster, &cli.scenario, true, |share| bar.set_position((share * 1000.0) as u64))?;
+    bar.finish_and_clear();
+    write_results(folder, loaded, &finished)?;
+    let summary = &finished.summary;
+    let (counts, hits) = (&summary.counts, &summary.morphology.hits);
+    println!(
+        "{}: t = {} h; {} axons: {} arrived, {} growing, {} stalled, {} left, {} unborn",
+        summary.scene, summary.time, counts.axons, counts.arrived, counts.growing, counts.stalled, counts.left, counts.unborn
+    );
+    if let Some(fraction) = hits.fraction {
+        println!("hit fraction {fraction:.3}");
+    }
+    for note in &summary.notes {
+        eprintln!("note: {note}");
+    }
+    if let Some(fault) = &summary.fault {
+        eprintln!("error: the run ended {fault}");
+    }
+    Ok(summary.complete)
+}
+
+fn run_seeds(
+    cli: &Cli,
+    roster: &Roster,
+    loaded: &Loaded,
+    folder: &std::path::Path,
+    count: u64,
+) -> Result<bool, RunError> {
+    let bar = progress_bar();
+    let runs = over_seeds(loaded, roster, &cli.scenario, count, |share| bar.set_position((share * 1000.0) as u64))?;
+    bar.finish_and_clear();
+    let summary = summarise(loaded, &runs)?;
+    write_json(&folder.join("summary.json"), &summary)?;
+    write_json(&folder.join("manifest.json"), &Manifest::of(loaded))?;
+    if let Some(first) = runs.first() {
+        first.recorder.trajectories.write(&folder.join("trajectories.csv"))?;
+        write_figure(folder, loaded, &first.recorder.snapshots)?;
+    }
+    println!("{}: {count} seeds; mean [95 % bootstrap interval]", summary.scene);
+    for (name, value) in &summary.measures {
+        let interval = value.low.zip(value.high).map_or(String::new(), |(l, h)| format!(" [{l:.4}, {h:.4}]"));
+        println!("  {name}: {:.4}{interval}", value.mean);
+    }
+    Ok(summary.complete)
+}
+
+/// A bar on standard error, drawn only on a terminal.
+fn progress_bar() -> ProgressBar {
+    let bar = ProgressBar::new(1000);
+    if let Ok(style) = ProgressStyle::with_template("{bar:40} {percent}% {elapsed} (remaining {eta})") {
+        bar.set_style(style);
+    }
+    bar
+}

@@ -1,0 +1,100 @@
+//! The Brownian path of a heading, on a dyadic tree.
+//!
+//! Ours: the paper has no noise. The path W(t) of an axon is fixed by (seed, axon, stream) alone. Root intervals of 2^30
+//! ticks (0.25 to 0.5 h) carry independent increments N(0, length); each interval is halved by the Brownian bridge,
+//! ΔW_left = ΔW/2 + √(length)/2 · z, with z drawn from the key (level, index). A step asks for the increment between two instants,
+//! which is a sum over few intervals. So a refined step refines the *same* path, and a step that a cone takes alone meets
+//! the same path as well.
+
+use super::random::{KeyedRng, Stream};
+use rand_distr::{Distribution, StandardNormal};
+
+/// Root intervals have 2^ROOT_LEVEL ticks.
+const ROOT_LEVEL: u32 = 30;
+
+/// The Brownian paths of all axons in one stream.
+#[derive(Debug, Clone, Copy)]
+pub struct BrownianTree {
+    seed: u64,
+    stream: Stream,
+    tick: f64,
+}
+
+impl BrownianTree {
+    /// The tree of a seed and a stream over ticks of length `tick` (h).
+    pub fn new(seed: u64, stream: Stream, tick: f64) -> Self {
+        Self { seed, stream, tick }
+    }
+
+    /// W(`to`) − W(`from`) of an axon in its two components (√h), instants in ticks, `from ≤ to`.
+    /// The second component serves solid scenes, where a heading has two tangent directions.
+    pub fn increment(&self, axon: u32, from: u64, to: u64) -> [f64; 2] {
+        let mut sum = [0.0; 2];
+        let mut at = from;
+        while at < to {
+            let aligned = at.trailing_zeros().min(ROOT_LEVEL);
+            let fits = (to - at).ilog2().min(ROOT_LEVEL);
+            let level = aligned.min(fits);
+            let part = self.interval(axon, level, at >> level);
+            sum = [sum[0] + part[0], sum[1] + part[1]];
+            at += 1 << level;
+        }
+        sum
+    }
+
+    /// Increment over the interval `index` of 2^level ticks, from its root down.
+    fn interval(&self, axon: u32, level: u32, index: u64) -> [f64; 2] {
+        let root = index >> (ROOT_LEVEL - level);
+        let mut width = self.tick * 2f64.powi(ROOT_LEVEL as i32);
+        let scale = width.sqrt();
+        let mut increment = self.normals(axon, ROOT_LEVEL, root).map(|z| scale * z);
+        for below in (level..ROOT_LEVEL).rev() {
+            let child = index >> (below - level);
+            let bridge = 0.5 * width.sqrt() * if child & 1 == 0 { 1.0 } else { -1.0 };
+            let z = self.normals(axon, below, child >> 1);
+            increment = [0.5 * increment[0] + bridge * z[0], 0.5 * increment[1] + bridge * z[1]];
+            width *= 0.5;
+        }
+        increment
+    }
+
+    fn normals(&self, axon: u32, level: u32, index: u64) -> [f64; 2] {
+        let mut rng = KeyedRng::new(self.seed, axon, self.stream, u64::from(level) << 50 | index);
+        [StandardNormal.sample(&mut rng), StandardNormal.sample(&mut rng)]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn tree() -> BrownianTree {
+        BrownianTree::new(11, Stream::named("heading_noise"), 1.2 * 2f64.powi(-32))
+    }
+
+    #[test]
+    fn parts_of_an_interval_add_up_to_it() {
+        let tree = tree();
+        let (from, to) = (5 << 12, (5 << 12) + (1 << 26) + (3 << 12));
+        let whole = tree.increment(3, from, to);
+        for middle in [from + (1 << 12), 1 << 20, (1 << 25) + (7 << 13)] {
+            let (a, b) = (tree.increment(3, from, middle), tree.increment(3, middle, to));
+            assert!((0..2).all(|i| (a[i] + b[i] - whole[i]).abs() < 1e-14));
+        }
+    }
+
+    #[test]
+    fn increments_have_the_variance_of_their_length_and_are_independent() {
+        let tree = tree();
+        let step = 1u64 << 26;
+        let length = tree.tick * step as f64;
+        let draws: Vec<f64> = (0..20_000u64)
+            .map(|i| tree.increment((i % 100) as u32, (i / 100) * step, (i / 100 + 1) * step)[0])
+            .collect();
+        let n = draws.len() as f64;
+        let variance = draws.iter().map(|x| x * x).sum::<f64>() / n;
+        let neighbours = draws.iter().zip(&draws[100..]).map(|(a, b)| a * b).sum::<f64>() / n;
+        assert!((variance / length - 1.0).abs() < 4.0 * (2.0 / n).sqrt(), "{}", variance / length);
+        assert!((neighbours / length).abs() < 4.0 / n.sqrt());
+    }
+}

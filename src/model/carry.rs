@@ -1,0 +1,33 @@
+//! Being carried: v_φ goes into [`Velocity`], and the rotation of the tissue may turn headings.
+//!
+//! The site already rides the tissue, so v_φ is reported and never added to the motion again. Installed only in a scene
+//! whose tissue moves.
+
+use super::components::{GrowthCone, Site, Velocity};
+use super::cones::Cones;
+use super::growth::Growth;
+use super::tissue::{Configuration, Tissue};
+use bevy_ecs::prelude::{Query, Res, With};
+
+/// Writes v_φ of each cone.
+pub fn carry(
+    tissue: Res<Tissue>,
+    configuration: Res<Configuration>,
+    mut cones: Query<(&Site, &mut Velocity), With<GrowthCone>>,
+) {
+    for (site, mut velocity) in &mut cones {
+        velocity.tissue = configuration.velocity(&tissue.mesh, *site);
+    }
+}
+
+/// Ours, `heading_follows: spin`: the rotation R of F = R U turns headings as it turns shafts.
+pub fn spin_headings(
+    growth: Res<Growth>,
+    tissue: Res<Tissue>,
+    configuration: Res<Configuration>,
+    mut cones: Cones,
+) {
+    if growth.heading_spins {
+        cones.for_each(|cone, spring| spring.spin.z += configuration.rotation_rate(&tissue.mesh, cone.site.cell));
+    }
+}

@@ -1,0 +1,119 @@
+//! How a mechanism meets the growth cones: one view of each that is growing, and the spring state it may add to.
+
+use super::components::{GrowthCone, Position, ReceptorWeights, Site, SpringState, Status};
+use bevy_ecs::prelude::{Component, Query, With};
+use bevy_ecs::system::SystemParam;
+use nalgebra::Vector3;
+use rayon::prelude::*;
+
+/// Cones handled by one task: fixed, so that the work is cut the same way on any number of threads.
+const CHUNK: usize = 64;
+
+/// What a mechanism may read of a growth cone at a stage.
+#[derive(Debug, Clone, Copy)]
+pub struct Cone<'a> {
+    /// Place in the order of all cones, which is the number of its shaft.
+    pub index: usize,
+    /// Identity, population, nominal speed, birth.
+    pub identity: &'a GrowthCone,
+    /// Material site.
+    pub site: Site,
+    /// Position (µm).
+    pub position: Vector3<f64>,
+    /// Receptor weights λ_i(t).
+    pub receptors: &'a [f64],
+}
+
+/// All growth cones, for a term of the right-hand side.
+#[derive(SystemParam)]
+pub struct Cones<'w, 's> {
+    query: Query<
+        'w,
+        's,
+        (
+            &'static GrowthCone,
+            &'static Status,
+            &'static Site,
+            &'static Position,
+            &'static ReceptorWeights,
+            &'static mut SpringState,
+        ),
+        With<GrowthCone>,
+    >,
+}
+
+impl Cones<'_, '_> {
+    /// Calls `act` for every growing cone, in parallel; returns how many there were. `act` reads the cone and writes its
+    /// own spring state, so the result does not depend on the number of threads.
+    pub fn for_each(&mut self, act: impl Fn(Cone, &mut SpringState) + Sync) -> u64 {
+        self.for_each_init(|| (), |(), cone, spring| act(cone, spring))
+    }
+
+    /// As [`Self::for_each`], with working memory that `init` makes and tasks reuse; no result may depend on its content.
+    pub fn for_each_init<T>(
+        &mut self,
+        init: impl Fn() -> T + Sync + Send,
+        act: impl Fn(&mut T, Cone, &mut SpringState) + Sync,
+    ) -> u64 {
+        let Ok(tables) = self.query.contiguous_iter_mut() else { return 0 };
+        let (mut first, mut growing) = (0, 0);
+        for (identities, statuses, sites, positions, receptors, mut springs) in tables {
+            let springs = springs.bypass_change_detection();
+            let count = springs.len();
+            growing += (identities, statuses, sites, positions, receptors, springs)
+                .into_par_iter()
+                .with_min_len(CHUNK)
+                .enumerate()
+                .filter(|(_, (_, status, ..))| **status == Status::Growing)
+                .map_init(&init, |memory, (i, (identity, _, site, position, receptors, spring))| {
+                    let index = first + i;
+                    let cone = Cone { index, identity, site: *site, position: position.0, receptors: &receptors.0 };
+                    act(memory, cone, spring);
+                })
+                .count() as u64;
+            first += count;
+        }
+        growing
+    }
+}
+
+/// All growth cones, for a term that writes a component of its own instead of the spring state.
+#[derive(SystemParam)]
+pub struct ConesWith<'w, 's, C: Component<Mutability = bevy_ecs::component::Mutable>> {
+    query: Query<
+        'w,
+        's,
+        (
+            &'static GrowthCone,
+            &'static Status,
+            &'static Site,
+            &'static Position,
+            &'static SpringState,
+            &'static mut C,
+        ),
+        With<GrowthCone>,
+    >,
+}
+
+impl<C: Component<Mutability = bevy_ecs::component::Mutable>> ConesWith<'_, '_, C> {
+    /// Calls `act` for every growing cone, in parallel, with its spring state to read and its component `C` to write.
+    /// The view's receptors are empty.
+    pub fn for_each(&mut self, act: impl Fn(Cone, &SpringState, &mut C) + Sync) {
+        let Ok(tables) = self.query.contiguous_iter_mut() else { return };
+        let mut first = 0;
+        for (identities, statuses, sites, positions, springs, mut own) in tables {
+            let own = own.bypass_change_detection();
+            let count = own.len();
+            (identities, statuses, sites, positions, springs, own)
+                .into_par_iter()
+                .with_min_len(CHUNK)
+                .enumerate()
+                .filter(|(_, (_, status, ..))| **status == Status::Growing)
+                .for_each(|(i, (identity, _, site, position, spring, own))| {
+                    let index = first + i;
+                    act(Cone { index, identity, site: *site, position: position.0, receptors: &[] }, spring, own);
+                });
+            first += count;
+        }
+    }
+}

@@ -1,0 +1,300 @@
+//! The public seam: one file, one mechanism.
+//!
+//! A mechanism is a struct that is at once its JSON block, the resource its systems read, and the law itself. It adds
+//! *rates*: pulls, speed factors, heading diffusion, spin. It never moves a cone and never sees Δt, so that the method
+//! stays a choice of the scenario. A mechanism that is absent costs nothing: it is not installed.
+
+use super::health::Health;
+use super::random::Stream;
+use super::schedule::{Motion, Phase, Schedules, Slot, Term};
+use super::components::GrowthCone;
+use super::violation::{Violation, Violations};
+use bevy_ecs::prelude::{Component, IntoScheduleConfigs, Resource, World};
+use bevy_ecs::schedule::SystemSet;
+use bevy_ecs::system::ScheduleSystem;
+use schemars::JsonSchema;
+use serde::de::DeserializeOwned;
+use serde_json::Value;
+use std::collections::{BTreeMap, BTreeSet};
+use std::ops::Deref;
+
+use super::shape::Shape;
+
+/// A guidance mechanism, or a provider of a field.
+///
+/// The type's doc comment and those of its fields are its reference; JSON-Schema keywords on the fields
+/// (`minimum`, `exclusiveMaximum`, `x-typical`, …) are its ranges, in base units.
+pub trait Mechanism: DeserializeOwned + JsonSchema + Send + Sync + 'static {
+    /// JSON key of its block, word for `--without`, name of its random stream.
+    const NAME: &'static str;
+
+    /// Checks what a schema cannot say: relations between keys, names that must exist in the scene.
+    fn check(&self, _facts: &Facts) -> Violations {
+        Violations::new()
+    }
+
+    /// Shapes that the mesh must be fitted to, by name.
+    fn outlines(&self) -> Vec<(String, Shape)> {
+        Vec::new()
+    }
+
+    /// Puts systems, resources and components in place.
+    ///
+    /// # Errors
+    /// What keeps the mechanism from working in this scene.
+    fn install(self, model: &mut ModelBuilder) -> Result<(), InstallError>;
+}
+
+/// Why a mechanism could not be installed.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum InstallError {
+    /// The scenario is at fault, at a place relative to the mechanism's block.
+    #[error("{0}")]
+    Scenario(Violation),
+    /// A solve failed.
+    #[error("{0}")]
+    Solve(String),
+}
+
+/// What a mechanism's check may know of the scene.
+#[derive(Debug, Clone, Default)]
+pub struct Facts {
+    /// Names of the populations.
+    pub populations: Vec<String>,
+    /// Names of the tissue's edges.
+    pub edges: Vec<String>,
+    /// The blocks of all mechanisms in the scene, as JSON.
+    pub blocks: serde_json::Map<String, Value>,
+    /// Length of the run (h).
+    pub duration: f64,
+}
+
+impl Facts {
+    /// Keys inside another mechanism's key, e.g. the names of the cues in `cues`.
+    pub fn names_in(&self, block: &str) -> Vec<String> {
+        match self.blocks.get(block) {
+            Some(Value::Object(keys)) => keys.keys().cloned().collect(),
+            _ => Vec::new(),
+        }
+    }
+}
+
+/// The sentence for a name that does not exist.
+pub fn unknown_name(kind: &str, name: &str, valid: &[String]) -> String {
+    match valid {
+        [] => format!("there is no {kind} called `{name}`; the scene has none"),
+        _ => format!("there is no {kind} called `{name}`; there are: {}", valid.join(", ")),
+    }
+}
+
+/// The law of a mechanism as a resource: `Res<Law<Borders>>` reads the block of the scenario.
+#[derive(Debug, Resource)]
+pub struct Law<M: Send + Sync + 'static>(pub M);
+
+impl<M: Send + Sync + 'static> Deref for Law<M> {
+    type Target = M;
+
+    fn deref(&self) -> &M {
+        &self.0
+    }
+}
+
+/// What mechanisms ask of providers: provider name → keys (a cue's name, say).
+#[derive(Debug, Clone, Default, Resource)]
+pub struct Demands(BTreeMap<String, BTreeSet<String>>);
+
+impl Demands {
+    /// The keys asked of a provider, in order.
+    pub fn of(&self, provider: &str) -> Vec<String> {
+        self.0.get(provider).map(|keys| keys.iter().cloned().collect()).unwrap_or_default()
+    }
+}
+
+type Finisher = Box<dyn FnOnce(&mut World) -> Result<(), InstallError>>;
+type Attacher = Box<dyn Fn(&mut World, &[bevy_ecs::entity::Entity])>;
+
+/// Takes what a mechanism installs.
+pub struct ModelBuilder<'a> {
+    /// The world, with tissue, populations, growth and clock already in it.
+    pub world: &'a mut World,
+    schedules: &'a mut Schedules,
+    slot: u32,
+    name: &'static str,
+    seed: u64,
+    pub(crate) finishers: Vec<(&'static str, Finisher)>,
+    pub(crate) attachers: Vec<Attacher>,
+}
+
+impl<'a> ModelBuilder<'a> {
+    /// A builder over a world and its schedules.
+    pub(crate) fn new(world: &'a mut World, schedules: &'a mut Schedules, seed: u64) -> Self {
+        world.init_resource::<Demands>();
+        world.init_resource::<Health>();
+        Self { world, schedules, slot: 0, name: "", seed, finishers: Vec::new(), attachers: Vec::new() }
+    }
+
+    /// Turns to the next mechanism of the roster.
+    pub(crate) fn turn_to(&mut self, slot: u32, name: &'static str) {
+        (self.slot, self.name) = (slot, name);
+    }
+
+    /// Inserts the law of the mechanism, to be read as `Res<Law<M>>`.
+    pub fn insert_law<M: Mechanism>(&mut self, law: M) -> &mut Self {
+        self.world.insert_resource(Law(law));
+        self
+    }
+
+    /// Inserts a resource of the mechanism's own.
+    pub fn insert<R: Resource>(&mut self, resource: R) -> &mut Self {
+        self.world.insert_resource(resource);
+        self
+    }
+
+    /// Runs a system in a term of the right-hand side, after those of the mechanisms before it in the roster.
+    pub fn term<Marker>(
+        &mut self,
+        term: Term,
+        system: impl IntoScheduleConfigs<ScheduleSystem, Marker>,
+    ) -> &mut Self {
+        let slot = Slot::Term(term, self.slot);
+        let schedule = &mut self.schedules.right_hand_side;
+        schedule.configure_sets(after(slot, (0..self.slot).map(|s| Slot::Term(term, s))).in_set(term));
+        schedule.add_systems(system.in_set(slot));
+        self
+    }
+
+    /// Runs a system in a phase of the step, after those of the mechanisms before it in the roster.
+    pub fn phase<Marker>(
+        &mut self,
+        phase: Phase,
+        system: impl IntoScheduleConfigs<ScheduleSystem, Marker>,
+    ) -> &mut Self {
+        let slot = Slot::Phase(phase, self.slot);
+        let schedule = &mut self.schedules.step;
+        schedule.configure_sets(after(slot, (0..self.slot).map(|s| Slot::Phase(phase, s))).in_set(phase));
+        schedule.add_systems(system.in_set(slot));
+        self
+    }
+
+    /// Runs a system that brings the tissue to the [stage time](super::clock::StageTime).
+    pub fn motion<Marker>(&mut self, system: impl IntoScheduleConfigs<ScheduleSystem, Marker>) -> &mut Self {
+        let slot = Slot::Motion(self.slot);
+        let schedule = &mut self.schedules.motion;
+        schedule.configure_sets(after(slot, (0..self.slot).map(Slot::Motion)).in_set(Motion::Matrix));
+        schedule.add_systems(system.in_set(slot));
+        self
+    }
+
+    /// Gives every growth cone a component of the mechanism's own, made from what the cone is.
+    pub fn attach<C: Component>(&mut self, make: impl Fn(&GrowthCone) -> C + 'static) -> &mut Self {
+        self.attachers.push(Box::new(move |world, cones| {
+            for &cone in cones {
+                let Some(own) = world.get::<GrowthCone>(cone).map(&make) else { continue };
+                world.entity_mut(cone).insert(own);
+            }
+        }));
+        self
+    }
+
+    /// Asks a provider (by its name) for one of its keys, so that it computes it; what nobody asks for is not computed.
+    pub fn demand(&mut self, provider: &str, key: &str) -> &mut Self {
+        let mut demands = self.world.resource_mut::<Demands>();
+        demands.0.entry(provider.to_owned()).or_default().insert(key.to_owned());
+        self
+    }
+
+    /// Runs `finish` when every mechanism is installed: when a provider knows what is asked of it.
+    pub fn at_end(&mut self, finish: impl FnOnce(&mut World) -> Result<(), InstallError> + 'static) -> &mut Self {
+        self.finishers.push((self.name, Box::new(finish)));
+        self
+    }
+
+    /// The mechanism's own random stream.
+    pub fn stream(&self) -> Stream {
+        Stream::named(self.name)
+    }
+
+    /// The seed of the run.
+    pub fn seed(&self) -> u64 {
+        self.seed
+    }
+}
+
+fn after<S: SystemSet + Copy>(
+    slot: S,
+    earlier: impl Iterator<Item = S>,
+) -> bevy_ecs::schedule::ScheduleConfigs<bevy_ecs::schedule::InternedSystemSet> {
+    earlier.fold(slot.into_configs(), |configs, earlier| configs.after(earlier))
+}
+
+/// A mechanism read from a scenario, ready to be installed.
+pub(crate) trait Installable {
+    fn check(&self, facts: &Facts) -> Violations;
+    fn outlines(&self) -> Vec<(String, Shape)>;
+    fn install(self: Box<Self>, model: &mut ModelBuilder) -> Result<(), InstallError>;
+}
+
+impl<M: Mechanism> Installable for M {
+    fn check(&self, facts: &Facts) -> Violations {
+        Mechanism::check(self, facts)
+    }
+
+    fn outlines(&self) -> Vec<(String, Shape)> {
+        Mechanism::outlines(self)
+    }
+
+    fn install(self: Box<Self>, model: &mut ModelBuilder) -> Result<(), InstallError> {
+        Mechanism::install(*self, model)
+    }
+}
+
+type Reader = fn(&Value) -> Result<Box<dyn Installable>, String>;
+
+/// One line of the roster.
+#[derive(Clone, Copy)]
+pub(crate) struct Entry {
+    pub(crate) name: &'static str,
+    pub(crate) schema: fn() -> Value,
+    pub(crate) read: Reader,
+}
+
+/// The mechanisms a program has, in order of summation. The roster is the only list of them.
+#[derive(Clone, Default)]
+pub struct Roster {
+    pub(crate) entries: Vec<Entry>,
+}
+
+impl Roster {
+    /// An empty roster.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Adds a mechanism at the end. One that has the name of an earlier one takes its place.
+    pub fn with<M: Mechanism>(mut self) -> Self {
+        let entry = Entry {
+            name: M::NAME,
+            schema: || schemars::schema_for!(M).into(),
+            read: |value| {
+                serde_path_to_error::deserialize::<_, M>(value)
+                    .map(|law| Box::new(law) as Box<dyn Installable>)
+                    .map_err(|error| error.to_string())
+            },
+        };
+        match self.entries.iter_mut().find(|other| other.name == M::NAME) {
+            Some(other) => *other = entry,
+            None => self.entries.push(entry),
+        }
+        self
+    }
+
+    /// Name and JSON Schema of each mechanism's block, in order.
+    pub fn schemas(&self) -> Vec<(&'static str, Value)> {
+        self.entries.iter().map(|entry| (entry.name, (entry.schema)())).collect()
+    }
+
+    /// Names of the mechanisms, in order.
+    pub fn names(&self) -> Vec<&'static str> {
+        self.entries.iter().map(|entry| entry.name).collect()
+    }
+}

@@ -1,0 +1,19 @@
+//! The vocabulary of the world: components, resources, the schedule, the integrator, random streams, and the public seam.
+
+pub mod births;
+pub mod brownian;
+pub mod carry;
+pub mod clock;
+pub mod components;
+pub mod cones;
+pub mod growth;
+pub mod health;
+pub mod integrator;
+pub mod mechanism;
+pub mod observables;
+pub mod random;
+pub mod schedule;
+pub mod settle;
+pub mod shafts;
+pub mod stopwatch;
+pub mod tissue;

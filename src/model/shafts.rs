@@ -1,0 +1,326 @@
+//! The shafts Γ: polylines of material points, one for each growth cone, from the origin to the tip.
+//!
+//! A vertex is stored where the path bends: the stored polyline stays within a tolerance of every point the cone has
+//! passed (in the reference configuration). Vertices never move once stored, whatever the tissue does, since they are
+//! material. They lie in blocks of a fixed number in flat arrays; blocks are linked shaft by shaft, so that a shaft can
+//! grow without moving others and parts can later be struck out. A planar vertex takes 24 bytes.
+
+use super::components::Site;
+use crate::numerics::locate::MaterialPoint;
+use bevy_ecs::prelude::Resource;
+
+/// Vertices a block.
+pub const BLOCK: usize = 16;
+const NONE: u32 = u32::MAX;
+
+/// Number of a stored vertex: place in the flat arrays.
+pub type VertexId = u32;
+
+/// What follows a stored vertex along its shaft.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Successor {
+    /// Another stored vertex.
+    Vertex(VertexId),
+    /// The live tip of the shaft.
+    Tip(u32),
+}
+
+/// The part of a shaft between its last stored vertex and its tip: the directions in which the tip may go on without
+/// the chord leaving the tolerance.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+struct OpenEnd {
+    anchor: [f64; 2],
+    tip: [f64; 2],
+    axis: [f64; 2],
+    low: f64,
+    high: f64,
+    far: f64,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Chain {
+    first: u32,
+    last: u32,
+    tip: Site,
+    tip_time: f32,
+    end: OpenEnd,
+}
+
+/// All shafts of a run.
+#[derive(Debug, Clone, Resource)]
+pub struct Shafts {
+    /// Largest distance between the stored polyline and the true path (µm, reference configuration).
+    pub tolerance: f64,
+    /// Longest stored segment (µm, reference configuration).
+    pub longest: f64,
+    cells: Vec<u32>,
+    times: Vec<f32>,
+    weights: Vec<[f64; 2]>,
+    used: Vec<u8>,
+    next: Vec<u32>,
+    owner: Vec<u32>,
+    chains: Vec<Chain>,
+    laid: Vec<VertexId>,
+}
+
+impl Shafts {
+    /// `count` shafts without a point. `tolerance` and `longest` in µm.
+    pub fn new(count: usize, tolerance: f64, longest: f64) -> Self {
+        let empty =
+            Chain { first: NONE, last: NONE, tip: Site::default(), tip_time: 0.0, end: OpenEnd::default() };
+        Self {
+            tolerance,
+            longest,
+            cells: Vec::new(),
+            times: Vec::new(),
+            weights: Vec::new(),
+            used: Vec::new(),
+            next: Vec::new(),
+            owner: Vec::new(),
+            chains: vec![empty; count],
+            laid: Vec::new(),
+        }
+    }
+
+    /// Number of shafts.
+    pub fn count(&self) -> usize {
+        self.chains.len()
+    }
+
+    /// Number of stored vertices.
+    pub fn vertex_count(&self) -> usize {
+        self.used.iter().map(|&n| n as usize).sum()
+    }
+
+    /// Starts a shaft at a site, whose reference position is `at` (µm).
+    pub fn start(&mut self, shaft: usize, site: Site, at: [f64; 2], time: f64) {
+        self.push(shaft, site, time as f32);
+        let chain = &mut self.chains[shaft];
+        chain.tip = site;
+        chain.tip_time = time as f32;
+        chain.end = OpenEnd { anchor: at, tip: at, ..OpenEnd::default() };
+    }
+
+    /// Moves the tip of a shaft on to a site with reference position `at`; stores the former tip when the chord to the
+    /// new one would leave the tolerance or grow too long.
+    pub fn extend(&mut self, shaft: usize, site: Site, at: [f64; 2], time: f64) {
+        let Chain { tip, tip_time, end, .. } = self.chains[shaft];
+        if let Some(wider) = self.widened(end, at) {
+            self.chains[shaft].end = wider;
+        } else {
+            self.push(shaft, tip, tip_time);
+            let fresh = OpenEnd { anchor: end.tip, tip: end.tip, ..OpenEnd::default() };
+            self.chains[shaft].end = self.widened(fresh, at).unwrap_or(OpenEnd { tip: at, ..fresh });
+        }
+        let chain = &mut self.chains[shaft];
+        chain.tip = site;
+        chain.tip_time = time as f32;
+    }
+
+    /// The open end with its tip at `to`, or `None` when the chord from the anchor to `to` would pass a point of the path
+    /// at more than the tolerance. The sector of allowed directions is kept as tangents of angles from a first direction.
+    fn widened(&self, end: OpenEnd, to: [f64; 2]) -> Option<OpenEnd> {
+        let chord = [to[0] - end.anchor[0], to[1] - end.anchor[1]];
+        let length = chord[0].hypot(chord[1]);
+        if end.far == 0.0 {
+            if length == 0.0 {
+                return Some(OpenEnd { tip: to, ..end });
+            }
+            let axis = [chord[0] / length, chord[1] / length];
+            let slope = self.tolerance / length;
+            return Some(OpenEnd { tip: to, axis, low: -slope, high: slope, far: length, ..end });
+        }
+        let along = chord[0] * end.axis[0] + chord[1] * end.axis[1];
+        let across = chord[1] * end.axis[0] - chord[0] * end.axis[1];
+        if along <= 0.5 * length || length > self.longest || length < end.far {
+            return None;
+        }
+        let slope = across / along;
+        if slope < end.low || slope > end.high {
+            return None;
+        }
+        let room = self.tolerance / along;
+        let (low, high) = (end.low.max(slope - room), end.high.min(slope + room));
+        Some(OpenEnd { tip: to, low, high, far: end.far.max(length), ..end })
+    }
+
+    fn push(&mut self, shaft: usize, site: Site, time: f32) {
+        let last = self.chains[shaft].last;
+        let full = last == NONE || self.used[last as usize] as usize == BLOCK;
+        let block = if full { self.add_block(shaft) } else { last };
+        let place = block as usize * BLOCK + self.used[block as usize] as usize;
+        self.cells[place] = site.cell;
+        self.times[place] = time;
+        self.weights[place] = [site.weights[0], site.weights[1]];
+        self.used[block as usize] += 1;
+        self.laid.push(place as VertexId);
+    }
+
+    fn add_block(&mut self, shaft: usize) -> u32 {
+        let block = self.used.len() as u32;
+        self.cells.resize(self.cells.len() + BLOCK, 0);
+        self.times.resize(self.times.len() + BLOCK, 0.0);
+        self.weights.resize(self.weights.len() + BLOCK, [0.0; 2]);
+        self.used.push(0);
+        self.next.push(NONE);
+        self.owner.push(shaft as u32);
+        let chain = &mut self.chains[shaft];
+        if chain.last == NONE {
+            chain.first = block;
+        } else {
+            self.next[chain.last as usize] = block;
+        }
+        chain.last = block;
+        block
+    }
+
+    /// Vertices stored since the last call, in the order they were laid: what a neighbour index has to add.
+    pub fn take_laid(&mut self) -> Vec<VertexId> {
+        std::mem::take(&mut self.laid)
+    }
+
+    /// The shaft that a stored vertex belongs to.
+    #[inline]
+    pub fn owner(&self, vertex: VertexId) -> u32 {
+        self.owner[vertex as usize / BLOCK]
+    }
+
+    /// Material point of a stored vertex.
+    #[inline]
+    pub fn point(&self, vertex: VertexId) -> MaterialPoint<2> {
+        MaterialPoint { cell: self.cells[vertex as usize], weights: self.weights[vertex as usize] }
+    }
+
+    /// Time (h) at which the cone passed a stored vertex.
+    pub fn time(&self, vertex: VertexId) -> f32 {
+        self.times[vertex as usize]
+    }
+
+    /// What comes after a stored vertex.
+    #[inline]
+    pub fn successor(&self, vertex: VertexId) -> Successor {
+        let block = vertex as usize / BLOCK;
+        if (vertex as usize % BLOCK) + 1 < self.used[block] as usize {
+            return Successor::Vertex(vertex + 1);
+        }
+        match self.next[block] {
+            NONE => Successor::Tip(self.owner[block]),
+            next => Successor::Vertex(next * BLOCK as u32),
+        }
+    }
+
+    /// The tip of a shaft as it was at the end of the last step.
+    #[inline]
+    pub fn tip(&self, shaft: u32) -> MaterialPoint<2> {
+        self.chains[shaft as usize].tip.planar()
+    }
+
+    /// The stored vertices of a shaft, from the origin on.
+    pub fn vertices(&self, shaft: usize) -> impl Iterator<Item = VertexId> + '_ {
+        let mut at = match self.chains[shaft].first {
+            NONE => None,
+            block => Some(block * BLOCK as u32),
+        };
+        std::iter::from_fn(move || {
+            let here = at?;
+            at = match self.successor(here) {
+                Successor::Vertex(next) => Some(next),
+                Successor::Tip(_) => None,
+            };
+            Some(here)
+        })
+    }
+
+    /// All material points of a shaft from the origin to the tip; empty before birth.
+    pub fn polyline(&self, shaft: usize) -> Vec<MaterialPoint<2>> {
+        let mut points: Vec<_> = self.vertices(shaft).map(|vertex| self.point(vertex)).collect();
+        if !points.is_empty() {
+            points.push(self.tip(shaft as u32));
+        }
+        points
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// One cell (0,0), (1,0), (0,1): weights are reference coordinates.
+    fn site(at: [f64; 2]) -> Site {
+        Site { cell: 0, weights: [at[0], at[1], 0.0] }
+    }
+
+    fn distance_to_polyline(point: [f64; 2], line: &[[f64; 2]]) -> f64 {
+        line.windows(2)
+            .map(|w| {
+                let (d, p) = ([w[1][0] - w[0][0], w[1][1] - w[0][1]], [point[0] - w[0][0], point[1] - w[0][1]]);
+                let t = ((d[0] * p[0] + d[1] * p[1]) / (d[0] * d[0] + d[1] * d[1]).max(1e-300)).clamp(0.0, 1.0);
+                (p[0] - t * d[0]).hypot(p[1] - t * d[1])
+            })
+            .fold(f64::INFINITY, f64::min)
+    }
+
+    fn grow(path: &[[f64; 2]], tolerance: f64, longest: f64) -> Vec<[f64; 2]> {
+        let mut shafts = Shafts::new(2, tolerance, longest);
+        shafts.start(1, site(path[0]), path[0], 0.0);
+        for (i, &at) in path.iter().enumerate().skip(1) {
+            shafts.extend(1, site(at), at, i as f64);
+        }
+        shafts.polyline(1).iter().map(|p| p.weights).collect()
+    }
+
+    #[test]
+    fn a_straight_path_keeps_only_its_ends_up_to_the_longest_segment() {
+        let path: Vec<_> = (0..=100).map(|i| [0.6 * i as f64, 0.8 * i as f64]).collect();
+        assert_eq!(grow(&path, 0.1, 1e9).len(), 2);
+        let line = grow(&path, 0.1, 10.0);
+        assert_eq!(line.len(), 11);
+    }
+
+    #[test]
+    fn the_stored_polyline_stays_within_the_tolerance_of_a_winding_path_and_is_far_shorter() {
+        let path: Vec<_> = (0..4000)
+            .map(|i| {
+                let s = 0.05 * i as f64;
+                [s, 3.0 * (0.3 * s).sin() + 0.7 * (1.1 * s).cos()]
+            })
+            .collect();
+        for tolerance in [0.05, 0.25, 1.0] {
+            let line = grow(&path, tolerance, 20.0);
+            let worst = path.iter().map(|&p| distance_to_polyline(p, &line)).fold(0.0, f64::max);
+            assert!(worst <= tolerance * (1.0 + 1e-9), "{worst} > {tolerance}");
+            assert!(line.len() < path.len() / 10, "{} vertices", line.len());
+        }
+    }
+
+    #[test]
+    fn a_hairpin_is_not_cut_off() {
+        let mut path: Vec<[f64; 2]> = (0..=50).map(|i| [0.1 * i as f64, 0.0]).collect();
+        path.extend((0..=50).map(|i| [5.0 - 0.1 * i as f64, 0.01]));
+        let line = grow(&path, 0.2, 20.0);
+        let worst = path.iter().map(|&p| distance_to_polyline(p, &line)).fold(0.0, f64::max);
+        assert!(worst <= 0.2, "{worst}");
+    }
+
+    #[test]
+    fn interleaved_shafts_keep_their_own_order_across_blocks() {
+        let mut shafts = Shafts::new(3, 1e-9, 1e9);
+        let at = |shaft: usize, i: usize| [i as f64, ((i * (shaft + 1)) as f64).sin()];
+        for i in 0..100 {
+            for shaft in 0..3 {
+                let point = at(shaft, i);
+                match i {
+                    0 => shafts.start(shaft, site(point), point, 0.0),
+                    _ => shafts.extend(shaft, site(point), point, i as f64),
+                }
+            }
+        }
+        for shaft in 0..3 {
+            let line = shafts.polyline(shaft);
+            assert_eq!(line.len(), 100);
+            assert!((0..100).all(|i| line[i].weights == at(shaft, i)));
+            assert!(shafts.vertices(shaft).all(|v| shafts.owner(v) as usize == shaft));
+        }
+        assert_eq!(shafts.take_laid().len(), 3 * 99);
+    }
+}

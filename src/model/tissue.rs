@@ -1,0 +1,185 @@
+//! The tissue Ω_M: its mesh in the reference configuration, and the configuration it is in now.
+
+use super::components::Site;
+use crate::numerics::locate::SeedGrid;
+use crate::numerics::planar_domain::{PlanarDomain, nearest_on_side, sides};
+use crate::numerics::simplex_mesh::{BorderFacet, SimplexMesh};
+use bevy_ecs::prelude::Resource;
+use nalgebra::{Matrix2, Vector2, Vector3};
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+/// The tissue at rest: geometry, mesh, named edges and named regions. It never changes during a run.
+#[derive(Debug, Resource)]
+pub struct Tissue {
+    /// The outline as the scenario gave it.
+    pub domain: PlanarDomain,
+    /// The mesh, in the reference configuration Ω⁰.
+    pub mesh: Arc<SimplexMesh<2>>,
+    /// Cells of each outline that the mesh was fitted to, by name (`cues/NAME/0`, `targets/NAME`, …).
+    pub regions: BTreeMap<String, Vec<u32>>,
+    /// Border facets of each named edge (in the order of `domain.edge_names`), each list in the order of the outline's points.
+    pub edges: Vec<Vec<BorderFacet>>,
+    seeds: SeedGrid<2>,
+}
+
+impl Tissue {
+    /// Puts mesh, edges and regions together.
+    pub fn new(domain: PlanarDomain, mesh: SimplexMesh<2>, regions: BTreeMap<String, Vec<u32>>) -> Self {
+        let mut edges = vec![Vec::new(); domain.edge_names.len()];
+        for facet in mesh.border() {
+            if let Some(list) = edges.get_mut(facet.edge as usize) {
+                list.push(*facet);
+            }
+        }
+        for list in &mut edges {
+            order_along(&domain, &mesh, list);
+        }
+        let seeds = SeedGrid::new(&mesh, mesh.vertices());
+        Self { domain, mesh: Arc::new(mesh), regions, edges, seeds }
+    }
+
+    /// Index of a named edge.
+    pub fn edge(&self, name: &str) -> Option<usize> {
+        self.domain.edge_names.iter().position(|edge| edge == name)
+    }
+
+    /// The site of a point of the reference configuration (µm), `None` outside.
+    pub fn locate(&self, point: [f64; 2]) -> Option<Site> {
+        self.seeds.locate(&self.mesh, self.mesh.vertices(), point).map(Site::from)
+    }
+
+    /// Reference position X of a site (µm).
+    pub fn reference_position(&self, site: Site) -> Vector3<f64> {
+        lift(site.planar().position(&self.mesh, self.mesh.vertices()))
+    }
+}
+
+/// The configuration φ(·, t): where the vertices are now, and how fast they move.
+#[derive(Debug, Clone, Resource)]
+pub struct Configuration {
+    /// Time of this configuration (h).
+    pub time: f64,
+    /// Vertex coordinates x(t) (µm).
+    pub coordinates: Vec<[f64; 2]>,
+    /// Vertex velocities v_φ (µm/h); all zero at rest.
+    pub velocities: Vec<[f64; 2]>,
+    /// Whether the tissue moves at all in this run.
+    pub moves: bool,
+    /// Load s that this configuration belongs to (0 at rest), the parameter of the path of equilibria.
+    pub load: f64,
+    /// Rate ṡ of the load (1/h).
+    pub load_rate: f64,
+    /// Counts the changes of configuration; 0 for the reference.
+    pub revision: u64,
+    /// Upper bound of ‖F⁻¹‖₂ over the tissue: a spatial distance r is at most `r · inverse_stretch` in the reference.
+    pub inverse_stretch: f64,
+}
+
+impl Configuration {
+    /// The reference configuration, at rest.
+    pub fn at_rest(mesh: &SimplexMesh<2>) -> Self {
+        Self {
+            time: 0.0,
+            coordinates: mesh.vertices().to_vec(),
+            velocities: vec![[0.0; 2]; mesh.vertex_count()],
+            moves: false,
+            load: 0.0,
+            load_rate: 0.0,
+            revision: 0,
+            inverse_stretch: 1.0,
+        }
+    }
+
+    /// Spatial position of a site (µm).
+    #[inline]
+    pub fn position(&self, mesh: &SimplexMesh<2>, site: Site) -> Vector3<f64> {
+        lift(site.planar().position(mesh, &self.coordinates))
+    }
+
+    /// Velocity v_φ of the tissue at a site (µm/h).
+    #[inline]
+    pub fn velocity(&self, mesh: &SimplexMesh<2>, site: Site) -> Vector3<f64> {
+        lift(site.planar().position(mesh, &self.velocities))
+    }
+
+    /// Deformation gradient F of a cell.
+    pub fn deformation_gradient(&self, mesh: &SimplexMesh<2>, cell: u32) -> Matrix2<f64> {
+        gradient_of(mesh, &self.coordinates, cell)
+    }
+
+    /// Spin (rad/h, about z) of the tissue in a cell: the rate at which the rotation of F = R U turns, which is the
+    /// skew part of Ḟ F⁻¹ corrected for the turning of the principal axes.
+    pub fn rotation_rate(&self, mesh: &SimplexMesh<2>, cell: u32) -> f64 {
+        let f = self.deformation_gradient(mesh, cell);
+        let rate = gradient_of(mesh, &self.velocities, cell);
+        let (a, b) = (f[(0, 0)] + f[(1, 1)], f[(1, 0)] - f[(0, 1)]);
+        let (da, db) = (rate[(0, 0)] + rate[(1, 1)], rate[(1, 0)] - rate[(0, 1)]);
+        (a * db - b * da) / (a * a + b * b)
+    }
+
+    /// Material velocity: the reference vector F⁻¹ v that belongs to a spatial vector v in a cell.
+    pub fn pull_back(&self, mesh: &SimplexMesh<2>, cell: u32, spatial: Vector3<f64>) -> Vector3<f64> {
+        if !self.moves {
+            return spatial;
+        }
+        let f = self.deformation_gradient(mesh, cell);
+        match f.try_inverse() {
+            Some(inverse) => {
+                let v = inverse * Vector2::new(spatial.x, spatial.y);
+                Vector3::new(v.x, v.y, 0.0)
+            }
+            None => Vector3::repeat(f64::NAN),
+        }
+    }
+
+    /// Recomputes the bound of ‖F⁻¹‖₂ from all cells.
+    pub fn bound_inverse_stretch(&mut self, mesh: &SimplexMesh<2>) {
+        let mut bound: f64 = 0.0;
+        for cell in 0..mesh.cell_count() as u32 {
+            let f = self.deformation_gradient(mesh, cell);
+            let (half, det) = (0.5 * f.norm_squared(), f.determinant());
+            let largest = (half + (half * half - det * det).max(0.0).sqrt()).sqrt();
+            bound = bound.max(largest / det);
+        }
+        self.inverse_stretch = bound * (1.0 + 1e-12);
+    }
+}
+
+fn gradient_of(mesh: &SimplexMesh<2>, field: &[[f64; 2]], cell: u32) -> Matrix2<f64> {
+    let corners = mesh.cell(cell as usize);
+    let columns = |values: &[[f64; 2]]| {
+        let [a, b, c] = [0, 1, 2].map(|i| values[corners[i] as usize]);
+        Matrix2::new(b[0] - a[0], c[0] - a[0], b[1] - a[1], c[1] - a[1])
+    };
+    let reference = columns(mesh.vertices());
+    let det = reference.determinant();
+    let adjugate = Matrix2::new(reference[(1, 1)], -reference[(0, 1)], -reference[(1, 0)], reference[(0, 0)]);
+    columns(field) * adjugate / det
+}
+
+/// Sorts the facets of an edge by where they lie along the rings of the outline.
+fn order_along(domain: &PlanarDomain, mesh: &SimplexMesh<2>, facets: &mut [BorderFacet]) {
+    let sides: Vec<_> = domain.rings().flat_map(|ring| sides(&ring.points)).collect();
+    let place = |facet: &BorderFacet| {
+        let ends: Vec<_> = mesh.facet_vertices(*facet).map(|v| mesh.vertices()[v as usize]).collect();
+        let middle = [0.5 * (ends[0][0] + ends[1][0]), 0.5 * (ends[0][1] + ends[1][1])];
+        let nearest = |a: &usize, b: &usize| {
+            let distance = |i: usize| nearest_on_side(sides[i], middle).distance;
+            distance(*a).total_cmp(&distance(*b))
+        };
+        let side = (0..sides.len()).min_by(nearest).unwrap_or_default();
+        let start = sides[side][0];
+        (side, (middle[0] - start[0]).hypot(middle[1] - start[1]))
+    };
+    facets.sort_by(|a, b| {
+        let (a, b) = (place(a), place(b));
+        a.0.cmp(&b.0).then(a.1.total_cmp(&b.1))
+    });
+}
+
+/// A planar point as a 3-vector with z exactly 0.
+#[inline]
+pub fn lift(point: [f64; 2]) -> Vector3<f64> {
+    Vector3::new(point[0], point[1], 0.0)
+}

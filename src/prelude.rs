@@ -1,0 +1,34 @@
+//! Everything a mechanism author needs: `use tropism::prelude::*;`.
+
+pub use schemars;
+pub use serde;
+pub use serde_json;
+
+pub use bevy_ecs::prelude::{Component, IntoScheduleConfigs, Query, Res, ResMut, Resource, With, World};
+pub use bevy_ecs::system::SystemParam;
+pub use nalgebra::{Rotation3, Vector3};
+pub use schemars::JsonSchema;
+pub use serde::{Deserialize, Serialize};
+
+pub use crate::model::brownian::BrownianTree;
+pub use crate::model::clock::{Clock, StageTime};
+pub use crate::model::components::{
+    Axon, GrowthCone, Journey, Position, ReceptorWeights, Site, SpringState, Status, Velocity,
+};
+pub use crate::model::cones::{Cone, Cones, ConesWith};
+pub use crate::model::growth::{Growth, Population, Populations, ShaftPopulations, Targets};
+pub use crate::model::health::{Counters, Health};
+pub use crate::model::integrator::HeadingPaths;
+pub use crate::model::mechanism::{Demands, Facts, InstallError, Law, Mechanism, ModelBuilder, Roster, unknown_name};
+pub use crate::model::quantity::{
+    Angle, AngularSpeed, Area, Concentration, ConcentrationGradient, Diffusivity, ElectricField, Factor, Gradient,
+    Kind, Length, Pressure, Quantity, Rate, ReleaseRate, Speed, StiffnessGradient, Time,
+};
+pub use crate::model::random::{KeyedRng, Stream};
+pub use crate::model::schedule::{Phase, Term};
+pub use crate::model::shafts::{Shafts, Successor, VertexId};
+pub use crate::model::shape::{Point, Shape};
+pub use crate::model::tissue::{Configuration, Tissue};
+pub use crate::model::violation::{Violation, Violations};
+pub use crate::systems::cue_fields::{CueFields, CueSample};
+pub use crate::{keys, quantity};

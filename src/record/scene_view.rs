@@ -1,0 +1,55 @@
+//! Snapshots as panels of a figure.
+
+use super::colour;
+use super::scene_figure::{BorderLine, CueLayer, FigureError, Panel, SceneFigure, Tip, TipStatus, to_svg};
+use super::snapshot::{FieldView, Snapshot, TipView};
+use crate::model::components::Status;
+use crate::model::observables::Effect;
+
+/// The figure of a run, one panel a snapshot.
+///
+/// # Errors
+/// No snapshot, or data that are not finite.
+pub fn scene_svg(title: &str, subtitle: &str, snapshots: &[Snapshot]) -> Result<String, FigureError> {
+    let panels = snapshots.iter().map(|snapshot| panel(format!("t = {} h", rounded(snapshot.time)), snapshot)).collect();
+    to_svg(&SceneFigure::new(title, subtitle, panels))
+}
+
+/// One snapshot as a panel with a label. Cues that nothing turns by are left out.
+pub fn panel(label: String, snapshot: &Snapshot) -> Panel {
+    let border = |(name, points): &(String, Vec<[f64; 2]>)| BorderLine { name: name.clone(), points: points.clone() };
+    Panel {
+        label,
+        note: String::new(),
+        vertices: snapshot.vertices.clone(),
+        cells: snapshot.cells.clone(),
+        borders: snapshot.borders.iter().map(border).collect(),
+        cues: snapshot.fields.iter().filter_map(cue).collect(),
+        shafts: snapshot.shafts.clone(),
+        tips: snapshot.tips.iter().filter_map(tip).collect(),
+        targets: snapshot.targets.iter().map(|(_, ring)| ring.clone()).collect(),
+    }
+}
+
+fn rounded(time: f64) -> f64 {
+    (time * 100.0).round() / 100.0
+}
+
+fn cue(field: &FieldView) -> Option<CueLayer> {
+    let effect = match field.effect? {
+        Effect::Attract => colour::Effect::Attract,
+        Effect::Repel => colour::Effect::Repel,
+    };
+    Some(CueLayer { name: field.name.clone(), effect, concentration: field.concentration.clone() })
+}
+
+fn tip(tip: &TipView) -> Option<Tip> {
+    let status = match tip.status {
+        Status::Unborn => return None,
+        Status::Growing => TipStatus::Growing,
+        Status::Arrived => TipStatus::Arrived,
+        Status::Stalled => TipStatus::Stalled,
+        Status::Left => TipStatus::Left,
+    };
+    Some(Tip { position: tip.position, status })
+}

@@ -1,0 +1,194 @@
+//! What a run looks like at one instant: plain data for pictures and measures.
+
+use crate::model::clock::Clock;
+use crate::model::components::{GrowthCone, Journey, Site, SpringState, Status};
+use crate::model::observables::{Effect, Observables};
+use crate::model::shafts::Shafts;
+use crate::model::tissue::{Configuration, Tissue};
+use crate::record::measures::AxonRecord;
+use bevy_ecs::prelude::{With, World};
+use std::collections::BTreeMap;
+
+/// One field at the vertices of the mesh.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FieldView {
+    /// Name of the cue.
+    pub name: String,
+    /// What it does to cones; `None` if nothing turns by it.
+    pub effect: Option<Effect>,
+    /// Concentration at each vertex (nM).
+    pub concentration: Vec<f64>,
+}
+
+/// A growth cone seen from outside.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TipView {
+    /// Number of its axon.
+    pub axon: u32,
+    /// Position (µm).
+    pub position: [f64; 2],
+    /// Unit heading.
+    pub heading: [f64; 2],
+    /// What it is doing.
+    pub status: Status,
+}
+
+/// The scene at one instant.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Snapshot {
+    /// Time (h).
+    pub time: f64,
+    /// Vertex positions (µm).
+    pub vertices: Vec<[f64; 2]>,
+    /// Triangles, flat, stride 3.
+    pub cells: Vec<u32>,
+    /// The outline: polylines of named edges.
+    pub borders: Vec<(String, Vec<[f64; 2]>)>,
+    /// The cue fields that the scene computes.
+    pub fields: Vec<FieldView>,
+    /// Shafts of all axons born, origin to tip (µm).
+    pub shafts: Vec<Vec<[f64; 2]>>,
+    /// Tips, in the order of the shafts.
+    pub tips: Vec<TipView>,
+    /// Targets: name and closed border (first point repeated).
+    pub targets: Vec<(String, Vec<[f64; 2]>)>,
+}
+
+impl Snapshot {
+    /// Looks at a world whose tissue has been brought to the present.
+    pub fn of(world: &World) -> Self {
+        let tissue = world.resource::<Tissue>();
+        let configuration = world.resource::<Configuration>();
+        Self {
+            time: world.resource::<Clock>().hours(),
+            vertices: configuration.coordinates.clone(),
+            cells: tissue.mesh.cells().to_vec(),
+            borders: borders(tissue, configuration),
+            fields: fields(world),
+            shafts: shafts(world),
+            tips: tips(world),
+            targets: targets(tissue, configuration),
+        }
+    }
+}
+
+/// Shafts of all axons born (µm), in the order of the cones.
+pub fn shafts(world: &World) -> Vec<Vec<[f64; 2]>> {
+    let (tissue, configuration) = (world.resource::<Tissue>(), world.resource::<Configuration>());
+    let shafts = world.resource::<Shafts>();
+    let place = |point: crate::numerics::locate::MaterialPoint<2>| point.position(&tissue.mesh, &configuration.coordinates);
+    (0..shafts.count())
+        .map(|shaft| shafts.polyline(shaft).into_iter().map(place).collect::<Vec<_>>())
+        .filter(|line| !line.is_empty())
+        .collect()
+}
+
+/// Tips of all axons born, in the order of the cones.
+pub fn tips(world: &World) -> Vec<TipView> {
+    let (tissue, configuration) = (world.resource::<Tissue>(), world.resource::<Configuration>());
+    let Some(mut cones) =
+        world.try_query_filtered::<(&GrowthCone, &Status, &Site, &SpringState), With<GrowthCone>>()
+    else {
+        return Vec::new();
+    };
+    cones
+        .iter(world)
+        .filter(|(_, status, ..)| **status != Status::Unborn)
+        .map(|(cone, status, site, spring)| {
+            let x = configuration.position(&tissue.mesh, *site);
+            let heading = [spring.heading.x, spring.heading.y];
+            TipView { axon: cone.axon, position: [x.x, x.y], heading, status: *status }
+        })
+        .collect()
+}
+
+/// What measures need of every axon born.
+pub fn axon_records(world: &World) -> Vec<AxonRecord> {
+    let Some(mut cones) =
+        world.try_query_filtered::<(&GrowthCone, &Status, &Journey, &SpringState), With<GrowthCone>>()
+    else {
+        return Vec::new();
+    };
+    let born = cones.iter(world).filter(|(_, status, ..)| **status != Status::Unborn);
+    born.zip(shafts(world))
+        .map(|((cone, status, journey, spring), shaft)| AxonRecord {
+            shaft,
+            birth_time: cone.birth_time,
+            arrival_time: (*status == Status::Arrived).then_some(journey.ended),
+            initial_heading: [journey.first_heading[0], journey.first_heading[1]],
+            final_heading: [spring.heading.x, spring.heading.y],
+        })
+        .collect()
+}
+
+fn fields(world: &World) -> Vec<FieldView> {
+    let observables = world.resource::<Observables>();
+    let view = |field: &crate::model::observables::Observable| FieldView {
+        name: field.name.clone(),
+        effect: observables.effects.get(&field.name).copied(),
+        concentration: (field.read)(world, field.index),
+    };
+    observables.fields.iter().map(view).collect()
+}
+
+/// The named edges as they are now; an edge in several pieces gives several polylines.
+fn borders(tissue: &Tissue, configuration: &Configuration) -> Vec<(String, Vec<[f64; 2]>)> {
+    let mut lines = Vec::new();
+    for (name, facets) in tissue.domain.edge_names.iter().zip(&tissue.edges) {
+        let mut last = None;
+        for facet in facets {
+            let ends: Vec<u32> = tissue.mesh.facet_vertices(*facet).collect();
+            if last != Some(ends[0]) {
+                lines.push((name.clone(), vec![configuration.coordinates[ends[0] as usize]]));
+            }
+            if let Some((_, line)) = lines.last_mut() {
+                line.push(configuration.coordinates[ends[1] as usize]);
+            }
+            last = Some(ends[1]);
+        }
+    }
+    lines
+}
+
+/// The border of each target as it is now.
+fn targets(tissue: &Tissue, configuration: &Configuration) -> Vec<(String, Vec<[f64; 2]>)> {
+    let named = tissue.regions.iter().filter_map(|(name, cells)| Some((name.strip_prefix("targets/")?, cells)));
+    named
+        .flat_map(|(name, cells)| {
+            region_rings(tissue, cells).into_iter().map(move |ring| {
+                let points = ring.iter().map(|&vertex| configuration.coordinates[vertex as usize]);
+                (name.to_owned(), points.collect())
+            })
+        })
+        .collect()
+}
+
+/// The closed borders of a set of cells (ascending), as vertices with the first one repeated.
+fn region_rings(tissue: &Tissue, cells: &[u32]) -> Vec<Vec<u32>> {
+    let mut next = BTreeMap::new();
+    for &cell in cells {
+        let corners = tissue.mesh.cell(cell as usize);
+        for face in 0..3 {
+            if cells.binary_search(&tissue.mesh.neighbour(cell as usize, face)).is_err() {
+                next.insert(corners[(face + 1) % 3], corners[(face + 2) % 3]);
+            }
+        }
+    }
+    let mut rings = Vec::new();
+    while let Some((&start, _)) = next.iter().next() {
+        let mut ring = vec![start];
+        let mut at = start;
+        while let Some(to) = next.remove(&at) {
+            ring.push(to);
+            at = to;
+        }
+        rings.push(ring);
+    }
+    rings
+}
+
+/// Height of the tissue now: lowest and highest y (µm).
+pub fn extent_in_y(configuration: &Configuration) -> (f64, f64) {
+    let ys = configuration.coordinates.iter().map(|x| x[1]);
+    ys.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), y| (low.min(y), high.max(y)))
+}

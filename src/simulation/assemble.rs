@@ -1,0 +1,227 @@
+//! From a scenario to a world.
+
+use super::{Simulation, populate};
+use crate::model::births::give_birth;
+use crate::model::carry::{carry, spin_headings};
+use crate::model::clock::{Clock, StageTime, TimeGrid};
+use crate::model::growth::{Growth, Method, OnBorder, Targets};
+use crate::model::health::{Counters, Health};
+use crate::model::integrator::{advance, bring_tissue_to};
+use crate::model::mechanism::{Facts, InstallError, Installable, ModelBuilder, Roster};
+use crate::model::observables::Observables;
+use crate::model::schedule::{MotionSchedule, Phase, RightHandSide, Schedules, Term};
+use crate::model::settle::settle;
+use crate::model::shape::{Shape, coordinates};
+use crate::model::stopwatch::Stopwatch;
+use crate::model::tissue::{Configuration, Tissue};
+use crate::model::violation::Violation;
+use crate::numerics::planar_domain::{Outline, PlanarDomain, Ring};
+use crate::numerics::triangulate::{MeshOptions, TriangulationError, triangulate};
+use crate::scenario::load::Loaded;
+use crate::scenario::scene::{self, Scene};
+use bevy_ecs::prelude::{IntoScheduleConfigs, World};
+use std::collections::BTreeMap;
+
+/// Why a scene could not be built.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum AssemblyError {
+    /// The scenario is at fault, at these places.
+    #[error("{}", .0.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n"))]
+    Scenario(Vec<Violation>),
+    /// Something could not be solved.
+    #[error("{0}")]
+    Solve(String),
+}
+
+impl AssemblyError {
+    fn at(pointer: &str, message: impl Into<String>) -> Self {
+        Self::Scenario(vec![Violation::new(pointer, message)])
+    }
+}
+
+/// A mechanism read from its block, with its place in the roster.
+struct Chosen {
+    slot: u32,
+    name: &'static str,
+    law: Box<dyn Installable>,
+}
+
+pub(super) fn assemble(loaded: &Loaded, roster: &Roster) -> Result<Simulation, AssemblyError> {
+    let scene = &loaded.scene;
+    let chosen = read_blocks(loaded, roster)?;
+    let mut world = World::new();
+    world.init_resource::<Stopwatch>();
+    world.init_resource::<Counters>();
+    world.init_resource::<Health>();
+    world.init_resource::<Observables>();
+    world.insert_resource(clock(scene)?);
+    world.insert_resource(StageTime(0.0));
+    world.insert_resource(growth(scene));
+    insert_tissue(&mut world, scene, &chosen)?;
+    world.resource_mut::<Stopwatch>().lap("mesh");
+    let cones = populate::spawn_cones(&mut world, scene)?;
+    let mut schedules = Schedules::new();
+    install(&mut world, &mut schedules, chosen, scene.seed, &cones)?;
+    add_core_systems(&world, &mut schedules);
+    schedules.initialize(&mut world).map_err(AssemblyError::Solve)?;
+    world.insert_resource(MotionSchedule(schedules.motion));
+    world.insert_resource(RightHandSide(schedules.right_hand_side));
+    bring_tissue_to(&mut world, 0.0);
+    let births = populate::births_in_order(&mut world);
+    world.resource_mut::<Stopwatch>().lap("assembly");
+    Ok(Simulation { world, step: schedules.step, births, next_birth: 0 })
+}
+
+/// Reads the blocks in the roster's order and lets each check itself against the scene.
+fn read_blocks(loaded: &Loaded, roster: &Roster) -> Result<Vec<Chosen>, AssemblyError> {
+    let mut chosen = Vec::new();
+    let mut wrong = Vec::new();
+    for (slot, entry) in roster.entries.iter().enumerate() {
+        let Some(block) = loaded.blocks.get(entry.name) else { continue };
+        match (entry.read)(block) {
+            Ok(law) => chosen.push(Chosen { slot: slot as u32, name: entry.name, law }),
+            Err(message) => wrong.push(Violation::new(format!("/{}", entry.name), message)),
+        }
+    }
+    let facts = facts(loaded);
+    for Chosen { name, law, .. } in &chosen {
+        wrong.extend(law.check(&facts).into_iter().map(|violation| violation.under(&format!("/{name}"))));
+    }
+    if wrong.is_empty() { Ok(chosen) } else { Err(AssemblyError::Scenario(wrong)) }
+}
+
+fn facts(loaded: &Loaded) -> Facts {
+    Facts {
+        populations: loaded.scene.populations.keys().cloned().collect(),
+        edges: loaded.scene.tissue.outline.edge_names(),
+        blocks: loaded.blocks.clone(),
+        duration: loaded.scene.time.duration.0,
+    }
+}
+
+fn clock(scene: &Scene) -> Result<Clock, AssemblyError> {
+    let grid = TimeGrid::new(scene.time.step.0)
+        .ok_or_else(|| AssemblyError::at("/time/step", "a step lies between 2e-6 s and 100 years"))?;
+    Ok(Clock { grid, now: 0, end: grid.nearest(scene.time.duration.0) })
+}
+
+fn growth(scene: &Scene) -> Growth {
+    let keys = &scene.growth;
+    Growth {
+        turning_rate: keys.turning_rate.0,
+        filopodium_length: keys.filopodium_length.0,
+        filopodia_time: keys.filopodia_time.0,
+        heading_spins: keys.heading_follows == scene::HeadingFollows::Spin,
+        on_border: match keys.on_border {
+            scene::OnBorder::Slide => OnBorder::Slide,
+            scene::OnBorder::Stall => OnBorder::Stall,
+            scene::OnBorder::Leave => OnBorder::Leave,
+        },
+        method: match scene.time.method {
+            scene::Method::Rotation => Method::Rotation,
+            scene::Method::Euler => Method::Euler,
+            scene::Method::Heun => Method::Heun,
+            scene::Method::Rk4 => Method::Rk4,
+        },
+        planar: scene.space == scene::Space::Planar,
+    }
+}
+
+/// Meshes the tissue, fitted to the targets and to every outline that a mechanism names.
+fn insert_tissue(world: &mut World, scene: &Scene, chosen: &[Chosen]) -> Result<(), AssemblyError> {
+    let mut named: Vec<(String, String, Shape)> = Vec::new();
+    for (name, shape) in &scene.targets {
+        named.push((format!("/targets/{name}"), format!("targets/{name}"), shape.clone()));
+    }
+    for Chosen { law, .. } in chosen {
+        named.extend(law.outlines().into_iter().map(|(name, shape)| (format!("/{name}"), name, shape)));
+    }
+    let domain = domain(&scene.tissue.outline);
+    let size = scene.tissue.mesh_size.0;
+    let outlines: Vec<Outline> = named.iter().map(|(_, _, shape)| outline(shape, size)).collect();
+    let options = MeshOptions {
+        size,
+        min_angle: scene.tissue.min_angle.radians(),
+        max_vertices: scene.tissue.max_vertices as usize,
+    };
+    let fitted = triangulate(&domain, &outlines, &options).map_err(|error| match error {
+        TriangulationError::OutlineOutside { outline, point } => AssemblyError::at(
+            &named[outline].0,
+            format!("lies outside the tissue at ({:.4}, {:.4}) um", point[0], point[1]),
+        ),
+        other => AssemblyError::at("/tissue", other.to_string()),
+    })?;
+    let mut inside = vec![false; fitted.mesh.cell_count()];
+    for ((pointer, _, _), cells) in named.iter().zip(&fitted.regions) {
+        if pointer.starts_with("/targets/") {
+            cells.iter().for_each(|&cell| inside[cell as usize] = true);
+        }
+    }
+    let any = inside.iter().any(|&is| is);
+    world.insert_resource(Targets { cells: if any { inside.into() } else { [].into() } });
+    let regions: BTreeMap<_, _> = named.into_iter().map(|(_, name, _)| name).zip(fitted.regions).collect();
+    world.insert_resource(Configuration::at_rest(&fitted.mesh));
+    world.insert_resource(Tissue::new(domain, fitted.mesh, regions));
+    Ok(())
+}
+
+fn domain(outline: &scene::Outline) -> PlanarDomain {
+    let names = outline.edge_names();
+    let ring = |ring: &scene::Ring| {
+        let index = |name: &String| names.iter().position(|other| other == name).unwrap_or_default() as u16;
+        Ring { points: ring.coordinates(), edges: ring.edges.iter().map(index).collect() }
+    };
+    PlanarDomain::new(ring(&outline.outer()), outline.holes().iter().map(ring).collect(), names.clone())
+}
+
+fn outline(shape: &Shape, size: f64) -> Outline {
+    match shape {
+        Shape::Disc { centre, radius } => Outline::disc([centre[0].0, centre[1].0], radius.0, size),
+        Shape::Polygon { points } => Outline::new(coordinates(points)),
+    }
+}
+
+fn install(
+    world: &mut World,
+    schedules: &mut Schedules,
+    chosen: Vec<Chosen>,
+    seed: u64,
+    cones: &[bevy_ecs::entity::Entity],
+) -> Result<(), AssemblyError> {
+    let mut builder = ModelBuilder::new(world, schedules, seed);
+    for Chosen { slot, name, law } in chosen {
+        builder.turn_to(slot, name);
+        law.install(&mut builder).map_err(|error| refused(name, error))?;
+        builder.world.resource_mut::<Stopwatch>().lap(name);
+    }
+    let (finishers, attachers) = (builder.finishers, builder.attachers);
+    for attach in attachers {
+        attach(world, cones);
+    }
+    for (name, finish) in finishers {
+        finish(world).map_err(|error| refused(name, error))?;
+        world.resource_mut::<Stopwatch>().lap(name);
+    }
+    Ok(())
+}
+
+fn refused(name: &str, error: InstallError) -> AssemblyError {
+    match error {
+        InstallError::Scenario(violation) => AssemblyError::Scenario(vec![violation.under(&format!("/{name}"))]),
+        InstallError::Solve(account) => AssemblyError::Solve(account),
+    }
+}
+
+fn add_core_systems(world: &World, schedules: &mut Schedules) {
+    schedules.step.add_systems((
+        give_birth.in_set(Phase::Birth),
+        advance.in_set(Phase::Advance),
+        settle.in_set(Phase::Settle),
+    ));
+    if world.resource::<Configuration>().moves {
+        schedules.right_hand_side.add_systems(carry.in_set(Term::Carry));
+        if world.resource::<Growth>().heading_spins {
+            schedules.right_hand_side.add_systems(spin_headings.in_set(Term::Carry).after(carry));
+        }
+    }
+}

@@ -1,0 +1,104 @@
+//! The hall: puts a scenario and a roster together, and runs the result step by step.
+//!
+//! It knows no mechanism by name. What a scene does not need is not built: no matrix without motion, no field that nobody
+//! reads, no index without contact.
+
+mod assemble;
+mod populate;
+
+pub use assemble::AssemblyError;
+
+use crate::model::clock::Clock;
+use crate::model::components::{GrowthCone, Status};
+use crate::model::health::{Counters, Fault, Health};
+use crate::model::integrator::bring_tissue_to;
+use crate::model::mechanism::Roster;
+use crate::model::stopwatch::Stopwatch;
+use crate::model::tissue::Configuration;
+use crate::scenario::load::Loaded;
+use bevy_ecs::prelude::{Schedule, With, World};
+
+/// A scene that runs.
+pub struct Simulation {
+    world: World,
+    step: Schedule,
+    births: Vec<u64>,
+    next_birth: usize,
+}
+
+impl Simulation {
+    /// Builds a scene: mesh, tissue, fields, cones, systems. Solves what must be solved before the first step.
+    ///
+    /// # Errors
+    /// What the scenario has wrong, by JSON pointer; a solve that failed, with place and amount.
+    pub fn assemble(loaded: &Loaded, roster: &Roster) -> Result<Self, AssemblyError> {
+        assemble::assemble(loaded, roster)
+    }
+
+    /// The world, to read from.
+    pub fn world(&self) -> &World {
+        &self.world
+    }
+
+    /// Time reached (h).
+    pub fn time(&self) -> f64 {
+        self.world.resource::<Clock>().hours()
+    }
+
+    /// Whether the end is reached.
+    pub fn is_over(&self) -> bool {
+        self.world.resource::<Clock>().is_over()
+    }
+
+    /// Share of the run that is done, in [0, 1].
+    pub fn progress(&self) -> f64 {
+        let clock = self.world.resource::<Clock>();
+        clock.now as f64 / clock.end.max(1) as f64
+    }
+
+    /// Books the time since the last lap on a phase.
+    pub fn lap(&mut self, phase: &'static str) {
+        self.world.resource_mut::<Stopwatch>().lap(phase);
+    }
+
+    /// Counts of what was done.
+    pub fn counters(&self) -> Counters {
+        *self.world.resource::<Counters>()
+    }
+
+    /// One step Δt. A step in which no cone grows and none is born only moves the clock.
+    ///
+    /// # Errors
+    /// The fault that ends the run; the state is that of the step's end.
+    pub fn step(&mut self) -> Result<(), Fault> {
+        let clock = *self.world.resource::<Clock>();
+        let to = clock.now + clock.next_step();
+        if self.is_idle(to) {
+            self.world.resource_mut::<Clock>().now = to;
+            return Ok(());
+        }
+        while self.births.get(self.next_birth).is_some_and(|birth| *birth < to) {
+            self.next_birth += 1;
+        }
+        self.bring_tissue_here();
+        self.step.run(&mut self.world);
+        match self.world.resource::<Health>().fault() {
+            Some(fault) => Err(fault.clone()),
+            None => Ok(()),
+        }
+    }
+
+    /// Brings the tissue to the time reached, which idle steps leave behind.
+    pub fn bring_tissue_here(&mut self) {
+        let time = self.time();
+        if self.world.resource::<Configuration>().moves && self.world.resource::<Configuration>().time != time {
+            bring_tissue_to(&mut self.world, time);
+        }
+    }
+
+    fn is_idle(&mut self, to: u64) -> bool {
+        let none_due = self.births.get(self.next_birth).is_none_or(|birth| *birth >= to);
+        let mut cones = self.world.query_filtered::<&Status, With<GrowthCone>>();
+        none_due && !cones.iter(&self.world).any(|status| *status == Status::Growing)
+    }
+}

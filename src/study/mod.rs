@@ -1,0 +1,4 @@
+//! Runs, and runs of runs.
+
+pub mod run;
+pub mod seeds;

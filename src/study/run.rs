@@ -1,0 +1,162 @@
+//! One run: a scenario in, a folder of results out.
+
+use crate::model::clock::Clock;
+use crate::model::health::Fault;
+use crate::model::mechanism::Roster;
+use crate::record::manifest::Manifest;
+use crate::record::output::{WriteError, write_atomically};
+use crate::record::png::{PngError, scale_for_dpi, to_png};
+use crate::record::recorder::{Recorder, RecorderOptions};
+use crate::record::scene_figure::FigureError;
+use crate::record::scene_view::scene_svg;
+use crate::record::snapshot::Snapshot;
+use crate::record::summary::{Summary, SummaryOptions};
+use crate::scenario::load::{Loaded, Request, ScenarioErrors, load};
+use crate::scenario::schema::BlockSchema;
+use crate::simulation::{AssemblyError, Simulation};
+use serde::Serialize;
+use std::path::{Path, PathBuf};
+
+/// Resolution of `figure.png`.
+const DPI: f32 = 200.0;
+
+/// Why there are no results, or not all of them.
+#[derive(Debug, thiserror::Error)]
+pub enum RunError {
+    /// The scenario is at fault.
+    #[error("{0}")]
+    Scenario(#[from] ScenarioErrors),
+    /// Something could not be solved before the first step.
+    #[error("{0}")]
+    Solve(String),
+    /// A file could not be written.
+    #[error("{0}")]
+    Write(#[from] WriteError),
+    /// The picture could not be drawn.
+    #[error("the figure could not be drawn: {0}")]
+    Picture(#[from] PngError),
+    /// The picture has nothing to show.
+    #[error("the figure could not be drawn: {0}")]
+    Figure(#[from] FigureError),
+    /// Something that must not happen.
+    #[error("internal: {0}")]
+    Internal(String),
+}
+
+/// What a finished run leaves in memory.
+pub struct Finished {
+    /// `summary.json`.
+    pub summary: Summary,
+    /// Trajectories and snapshots.
+    pub recorder: Recorder,
+}
+
+/// Reads a scenario for a roster.
+///
+/// # Errors
+/// All problems of the file at once.
+pub fn read(request: &Request, roster: &Roster) -> Result<Loaded, ScenarioErrors> {
+    let schemas = roster.schemas().into_iter();
+    let blocks: Vec<_> = schemas.map(|(name, schema)| BlockSchema::new(name, schema)).collect();
+    load(request, &blocks)
+}
+
+/// Runs a loaded scene to its end, or to the fault that ends it. `tick` is called after each step with the share done.
+///
+/// # Errors
+/// A scene that cannot be assembled. A fault while running is no error: it stands in the summary.
+pub fn simulate(
+    loaded: &Loaded,
+    roster: &Roster,
+    path: &Path,
+    keep_trajectories: bool,
+    mut tick: impl FnMut(f64),
+) -> Result<Finished, RunError> {
+    let mut simulation = Simulation::assemble(loaded, roster).map_err(|error| match error {
+        AssemblyError::Scenario(problems) => {
+            RunError::Scenario(ScenarioErrors { path: path.to_owned(), problems })
+        }
+        AssemblyError::Solve(account) => RunError::Solve(account),
+    })?;
+    let clock = *simulation.world().resource::<Clock>();
+    let mut recorder = Recorder::new(&recorder_options(loaded, keep_trajectories), &clock.grid, clock.end);
+    let fault = run_to_end(&mut simulation, &mut recorder, &mut tick)?;
+    simulation.bring_tissue_here();
+    let output = &loaded.scene.output;
+    let options = SummaryOptions {
+        scene: loaded.scene.name.clone(),
+        seed: loaded.scene.seed,
+        heights: output.heights.iter().map(|share| share.0).collect(),
+        linkage: output.linkage_distance.0,
+    };
+    let summary = Summary::of(simulation.world(), &options, fault.as_ref());
+    Ok(Finished { summary, recorder })
+}
+
+fn recorder_options(loaded: &Loaded, keep_trajectories: bool) -> RecorderOptions {
+    let (output, duration) = (&loaded.scene.output, loaded.scene.time.duration.0);
+    RecorderOptions {
+        trajectory_interval: keep_trajectories.then_some(output.trajectory_interval.0),
+        figure_times: output.figure_times.iter().map(|share| share.0 * duration).collect(),
+    }
+}
+
+fn run_to_end(
+    simulation: &mut Simulation,
+    recorder: &mut Recorder,
+    tick: &mut impl FnMut(f64),
+) -> Result<Option<Fault>, RunError> {
+    loop {
+        let now = simulation.world().resource::<Clock>().now;
+        if recorder.is_due(now) {
+            simulation.bring_tissue_here();
+            recorder.observe(simulation.world()).map_err(|error| RunError::Internal(error.to_string()))?;
+            simulation.lap("record");
+        }
+        if simulation.is_over() {
+            return Ok(None);
+        }
+        if let Err(fault) = simulation.step() {
+            recorder.snapshots.push(Snapshot::of(simulation.world()));
+            return Ok(Some(fault));
+        }
+        tick(simulation.progress());
+    }
+}
+
+/// Writes everything a single run leaves, into `folder`.
+///
+/// # Errors
+/// The file that could not be written, or the picture that could not be drawn.
+pub fn write_results(folder: &Path, loaded: &Loaded, finished: &Finished) -> Result<(), RunError> {
+    write_json(&folder.join("summary.json"), &finished.summary)?;
+    write_json(&folder.join("manifest.json"), &Manifest::of(loaded))?;
+    finished.recorder.trajectories.write(&folder.join("trajectories.csv"))?;
+    write_figure(folder, loaded, &finished.recorder.snapshots)
+}
+
+/// Writes `figure.svg` and `figure.png`.
+///
+/// # Errors
+/// As [`write_results`].
+pub fn write_figure(folder: &Path, loaded: &Loaded, snapshots: &[Snapshot]) -> Result<(), RunError> {
+    let svg = scene_svg(&loaded.scene.name, &loaded.scene.description, snapshots)?;
+    write_atomically(&folder.join("figure.svg"), svg.as_bytes())?;
+    write_atomically(&folder.join("figure.png"), &to_png(&svg, scale_for_dpi(DPI))?)?;
+    Ok(())
+}
+
+/// Writes a value as indented JSON.
+///
+/// # Errors
+/// As [`write_results`].
+pub fn write_json(path: &Path, value: &impl Serialize) -> Result<(), RunError> {
+    let mut text = serde_json::to_string_pretty(value).map_err(|error| RunError::Internal(error.to_string()))?;
+    text.push('\n');
+    Ok(write_atomically(path, text.as_bytes())?)
+}
+
+/// The folder of a scene's results: the one asked for, or `out/<scene>`.
+pub fn folder_of(asked: Option<&PathBuf>, scene: &str) -> PathBuf {
+    asked.cloned().unwrap_or_else(|| Path::new("out").join(scene))
+}

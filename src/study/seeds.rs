@@ -1,0 +1,123 @@
+//! Paired runs of one scene over several seeds: the seed is the unit of statistics.
+
+use super::run::{Finished, RunError, simulate};
+use crate::model::mechanism::Roster;
+use crate::model::random::{KeyedRng, Stream};
+use crate::record::statistics::SummaryOverSeeds;
+use crate::record::summary::Summary;
+use crate::scenario::load::Loaded;
+use serde::Serialize;
+use serde_json::Value;
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
+use std::sync::{Mutex, PoisonError};
+
+/// `summary.json` of a run over seeds.
+#[derive(Debug, Clone, Serialize)]
+pub struct SeedsSummary {
+    /// Name of the scene.
+    pub scene: String,
+    /// The seeds.
+    pub seeds: Vec<u64>,
+    /// Whether every run came to its end.
+    pub complete: bool,
+    /// Each measure by its place in the summary of a run: mean over seeds and 95 % bootstrap interval of the mean.
+    pub measures: BTreeMap<String, SummaryOverSeeds>,
+    /// The same measures, one value a seed (`null` where a run has none).
+    pub values: BTreeMap<String, Vec<Option<f64>>>,
+    /// The summary of each run.
+    pub runs: Vec<Summary>,
+}
+
+/// Runs a scene for `count` seeds from its own seed on, on `threads` threads; runs come back in the order of their seeds.
+/// Only the first keeps its trajectories and pictures.
+///
+/// # Errors
+/// The first seed's error, if any run could not be assembled.
+pub fn over_seeds(
+    loaded: &Loaded,
+    roster: &Roster,
+    path: &Path,
+    count: u64,
+    tick: impl Fn(f64) + Sync,
+) -> Result<Vec<Finished>, RunError> {
+    let threads = rayon::current_num_threads().min(count as usize).max(1);
+    let (next, done) = (AtomicUsize::new(0), AtomicU64::new(0));
+    let slots: Vec<Mutex<Option<Result<Finished, RunError>>>> = (0..count).map(|_| Mutex::new(None)).collect();
+    let work = || {
+        loop {
+            let place = next.fetch_add(1, Ordering::Relaxed);
+            let Some(slot) = slots.get(place) else { break };
+            let mut own = loaded.clone();
+            own.scene.seed += place as u64;
+            let result = simulate(&own, roster, path, place == 0, |_| {});
+            *slot.lock().unwrap_or_else(PoisonError::into_inner) = Some(result);
+            tick((done.fetch_add(1, Ordering::Relaxed) + 1) as f64 / count as f64);
+        }
+    };
+    std::thread::scope(|scope| {
+        for _ in 0..threads {
+            scope.spawn(|| match rayon::ThreadPoolBuilder::new().num_threads(1).build() {
+                Ok(pool) => pool.install(work),
+                Err(_) => work(),
+            });
+        }
+    });
+    slots
+        .into_iter()
+        .map(|slot| slot.into_inner().unwrap_or_else(PoisonError::into_inner))
+        .map(|result| result.unwrap_or_else(|| Err(RunError::Internal("a run was lost".into()))))
+        .collect()
+}
+
+/// Puts the runs together.
+///
+/// # Errors
+/// A summary that is no JSON.
+pub fn summarise(loaded: &Loaded, runs: &[Finished]) -> Result<SeedsSummary, RunError> {
+    let mut values: BTreeMap<String, Vec<Option<f64>>> = BTreeMap::new();
+    for (place, run) in runs.iter().enumerate() {
+        for (name, value) in leaves(&run.summary)? {
+            let row = values.entry(name).or_insert_with(|| vec![None; runs.len()]);
+            row[place] = Some(value);
+        }
+    }
+    let mut measures = BTreeMap::new();
+    for (name, row) in &values {
+        let mut rng = KeyedRng::new(loaded.scene.seed, 0, Stream::named("bootstrap"), 0);
+        if let Some(summary) = SummaryOverSeeds::of_present(row, &mut rng) {
+            measures.insert(name.clone(), summary);
+        }
+    }
+    Ok(SeedsSummary {
+        scene: loaded.scene.name.clone(),
+        seeds: (0..runs.len() as u64).map(|i| loaded.scene.seed + i).collect(),
+        complete: runs.iter().all(|run| run.summary.complete),
+        measures,
+        values,
+        runs: runs.iter().map(|run| run.summary.clone()).collect(),
+    })
+}
+
+/// All numbers of counts and morphology, by their dotted place.
+fn leaves(summary: &Summary) -> Result<Vec<(String, f64)>, RunError> {
+    let value = serde_json::to_value((&summary.counts, &summary.morphology))
+        .map_err(|error| RunError::Internal(error.to_string()))?;
+    let mut found = Vec::new();
+    collect("counts", &value[0], &mut found);
+    collect("", &value[1], &mut found);
+    Ok(found)
+}
+
+fn collect(place: &str, value: &Value, found: &mut Vec<(String, f64)>) {
+    let inside = |key: &str| if place.is_empty() { key.to_owned() } else { format!("{place}.{key}") };
+    match value {
+        Value::Number(number) => found.extend(number.as_f64().map(|x| (place.to_owned(), x))),
+        Value::Object(keys) => keys.iter().for_each(|(key, value)| collect(&inside(key), value, found)),
+        Value::Array(items) => {
+            items.iter().enumerate().for_each(|(i, value)| collect(&inside(&i.to_string()), value, found));
+        }
+        _ => {}
+    }
+}

@@ -1,0 +1,134 @@
+//! Short-range repulsion along the borders, which keeps axons inside.
+//!
+//! The paper: "along the borders short-range repulsive cues are used to keep axons confined". Ours: its form,
+//! B = Σ over named edges of n_in exp(−d / ℓ_b), d the distance to the edge's nearest point and n_in the unit vector from that
+//! point to the cone; each edge counts once, however many segments it has, and no PDE is solved for it. A pull alone cannot
+//! confine: a cone that meets the wall at less than the angle of [`escape_angle`] from its normal crosses, and then
+//! `on_border` decides.
+
+use crate::numerics::simplex_mesh::BorderFacet;
+use crate::prelude::*;
+
+keys! {
+    /// Short-range repulsion along the borders; L̂ += λ_b Σ_edges n_in exp(−d/ℓ_b).
+    pub struct Borders {
+        /// Strength λ_b of the pull at the border. Ours.
+        #[schemars(extend("minimum" = 0.0, "x-typical" = [0.0, 8.0]))]
+        pub weight: Factor = Factor(4.0),
+        /// Range ℓ_b over which it decays. Ours; the paper says "short".
+        #[schemars(extend("exclusiveMinimum" = 0.0, "x-typical" = [2.0, 20.0]))]
+        pub range: Length = Length(5.0),
+    }
+}
+
+impl Mechanism for Borders {
+    const NAME: &'static str = "borders";
+
+    fn install(self, model: &mut ModelBuilder) -> Result<(), InstallError> {
+        model.insert(EdgeBoxes::default()).insert_law(self);
+        model.term(Term::Contact, (bound_edges, repel).chain());
+        Ok(())
+    }
+}
+
+/// Beyond this many ranges a border adds less than the rounding of a pull of 1, and is left out.
+const RANGES: f64 = 40.0;
+
+/// Bounding box of each named edge in the present configuration.
+#[derive(Debug, Default, Resource)]
+struct EdgeBoxes {
+    revision: Option<u64>,
+    boxes: Vec<[[f64; 2]; 2]>,
+}
+
+/// Largest angle (rad) between a cone's heading and the wall's normal at which it still crosses:
+/// sin θ = exp(−κ λ_b ℓ_b / v). Turning rate κ in 1/h, range in µm, speed in µm/h.
+pub fn escape_angle(turning_rate: f64, weight: f64, range: f64, speed: f64) -> f64 {
+    (-turning_rate * weight * range / speed).exp().asin()
+}
+
+fn bound_edges(tissue: Res<Tissue>, configuration: Res<Configuration>, mut boxes: ResMut<EdgeBoxes>) {
+    if boxes.revision == Some(configuration.revision) {
+        return;
+    }
+    boxes.revision = Some(configuration.revision);
+    boxes.boxes = tissue.edges.iter().map(|facets| bounding_box(&tissue, &configuration, facets)).collect();
+}
+
+fn bounding_box(tissue: &Tissue, configuration: &Configuration, facets: &[BorderFacet]) -> [[f64; 2]; 2] {
+    let mut bounds = [[f64::INFINITY; 2], [f64::NEG_INFINITY; 2]];
+    for vertex in facets.iter().flat_map(|facet| tissue.mesh.facet_vertices(*facet)) {
+        let x = configuration.coordinates[vertex as usize];
+        for k in 0..2 {
+            bounds[0][k] = bounds[0][k].min(x[k]);
+            bounds[1][k] = bounds[1][k].max(x[k]);
+        }
+    }
+    bounds
+}
+
+fn repel(
+    law: Res<Law<Borders>>,
+    tissue: Res<Tissue>,
+    configuration: Res<Configuration>,
+    boxes: Res<EdgeBoxes>,
+    mut cones: Cones,
+) {
+    let (weight, range) = (law.weight.0, law.range.0);
+    cones.for_each(|cone, spring| {
+        for (facets, bounds) in tissue.edges.iter().zip(&boxes.boxes) {
+            if distance_to_box(cone.position, bounds) < RANGES * range {
+                spring.pull += edge_pull(&tissue, &configuration, facets, cone.position, range) * weight;
+            }
+        }
+    });
+}
+
+fn distance_to_box(x: Vector3<f64>, bounds: &[[f64; 2]; 2]) -> f64 {
+    let outside = |k: usize| (bounds[0][k] - x[k]).max(x[k] - bounds[1][k]).max(0.0);
+    outside(0).hypot(outside(1))
+}
+
+/// n_in exp(−d/ℓ) of one edge at x: n_in from the edge's nearest point to x (the facet's inner normal on the edge itself).
+fn edge_pull(
+    tissue: &Tissue,
+    configuration: &Configuration,
+    facets: &[BorderFacet],
+    x: Vector3<f64>,
+    range: f64,
+) -> Vector3<f64> {
+    let mut nearest = (f64::INFINITY, Vector3::zeros());
+    for facet in facets {
+        let [a, b] = facet_ends(tissue, configuration, *facet);
+        let along = b - a;
+        let share = ((x - a).dot(&along) / along.norm_squared()).clamp(0.0, 1.0);
+        let away = x - (a + along * share);
+        let distance = away.norm();
+        if distance < nearest.0 {
+            let normal = Vector3::new(-along.y, along.x, 0.0).normalize();
+            nearest = (distance, if distance > 0.0 { away / distance } else { normal });
+        }
+    }
+    nearest.1 * (-nearest.0 / range).exp()
+}
+
+fn facet_ends(tissue: &Tissue, configuration: &Configuration, facet: BorderFacet) -> [Vector3<f64>; 2] {
+    let corners = tissue.mesh.cell(facet.cell as usize);
+    let end = |k: usize| {
+        let x = configuration.coordinates[corners[(facet.face as usize + k) % 3] as usize];
+        Vector3::new(x[0], x[1], 0.0)
+    };
+    [end(1), end(2)]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_escape_angle_at_the_defaults_is_the_one_the_model_states() {
+        let degrees = escape_angle(0.93, 4.0, 5.0, 20.0).to_degrees();
+        assert!((degrees - 23.0).abs() < 0.5, "{degrees}");
+        assert_eq!(escape_angle(0.93, 0.0, 5.0, 20.0).to_degrees(), 90.0);
+    }
+}

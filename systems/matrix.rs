@@ -1,0 +1,273 @@
+//! Provider: the deforming matrix, eq. (3).
+//!
+//! −∇_X·P = 0, U = Û(t) on the named edges that move, P·n = 0 elsewhere; quasi-static, plane strain, P1. The equilibrium
+//! depends on one load s(t) ∈ [0, 1] alone, so a few load levels are solved before the run and interpolated by cubic Hermite
+//! polynomials; v_φ = ṡ times the derivative of that interpolant. The paper moves top and bottom by "about 20 % of the initial
+//! vertical dimension for each side"; ours: outward, held sideways, linear in time, material numbers.
+
+use crate::numerics::hyperelasticity::{Body, Prescribed};
+use crate::numerics::load_path::{LoadPath, LoadPathOptions};
+use crate::numerics::material::{Lame, Material, NeoHookean, StVenantKirchhoff};
+use crate::prelude::*;
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+/// The law of the matrix.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum MaterialLaw {
+    /// St. Venant–Kirchhoff, as in the paper; soft in compression, where it fails.
+    StVenantKirchhoff,
+    /// Neo-Hookean, ours: stays well-posed in compression.
+    NeoHookean,
+}
+
+/// What an edge does sideways while it moves.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Sideways {
+    /// Held: both components are imposed.
+    Held,
+    /// Sliding: only the component along the edge's normal is imposed; the edge must be parallel to an axis.
+    Sliding,
+}
+
+keys! {
+    /// Imposed motion of one named edge, at full load.
+    pub struct EdgeMotion {
+        /// Motion along the edge's outward normal, as a share of the tissue's extent in that direction; negative is inward.
+        #[schemars(extend("exclusiveMinimum" = -0.5, "x-typical" = [-0.2, 0.5]))]
+        pub outward: Factor = Factor(0.0),
+        /// A further displacement `[x, y]`.
+        pub shift: [Length; 2] = [Length(0.0), Length(0.0)],
+        /// What the edge does sideways. Ours.
+        pub sideways: Sideways = Sideways::Held,
+    }
+
+    /// The load s over time: straight lines between the given pairs, constant outside them.
+    pub struct LoadCurve {
+        /// Times, ascending. Empty: from 0 to the end of the run.
+        pub times: Vec<Time> = Vec::new(),
+        /// Loads at these times, each in [0, 1].
+        pub loads: Vec<Factor> = Vec::new(),
+    }
+
+    /// The deforming matrix (eq. 3): hyperelastic, moved at named edges.
+    pub struct Matrix {
+        /// The material.
+        pub material: MaterialLaw = MaterialLaw::StVenantKirchhoff,
+        /// Young's modulus E. It drops out of displacements when only motion is imposed. Source: embryonic mesoderm.
+        #[schemars(extend("exclusiveMinimum" = 0.0, "x-typical" = [100.0, 3000.0]))]
+        pub young_modulus: Pressure = Pressure(500.0),
+        /// Poisson's ratio ν.
+        #[schemars(extend("minimum" = 0.0, "exclusiveMaximum" = 0.5, "x-typical" = [0.2, 0.45]))]
+        pub poisson_ratio: Factor = Factor(0.3),
+        /// The edges that move, by name; edges not named are free. Empty: top and bottom, outward by 20 %, held.
+        pub motion: BTreeMap<String, EdgeMotion> = BTreeMap::new(),
+        /// The load over time. Ours: linear over the whole run.
+        pub load: LoadCurve = LoadCurve::default(),
+        /// Largest error of the interpolated displacement between load levels, over the tissue's size. Ours.
+        #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 0.1, "x-typical" = [1e-8, 1e-4]))]
+        pub tolerance: Factor = Factor(1e-6),
+    }
+}
+
+impl Matrix {
+    /// The motion with its default filled in: top and bottom outward by 20 % each [paper], held sideways.
+    fn edges(&self) -> BTreeMap<String, EdgeMotion> {
+        if !self.motion.is_empty() {
+            return self.motion.clone();
+        }
+        let outward = EdgeMotion { outward: Factor(0.2), ..EdgeMotion::default() };
+        ["top", "bottom"].map(|name| (name.to_owned(), outward.clone())).into()
+    }
+
+    fn law(&self) -> Result<Arc<dyn Material<2>>, InstallError> {
+        let lame = Lame::from_young_poisson(self.young_modulus.0, self.poisson_ratio.0).map_err(solve_error)?;
+        Ok(match self.material {
+            MaterialLaw::StVenantKirchhoff => Arc::new(StVenantKirchhoff { lame }),
+            MaterialLaw::NeoHookean => Arc::new(NeoHookean { lame }),
+        })
+    }
+
+    /// Vertices and amplitudes of the imposed motion. A body that could still slide sideways is held at one vertex.
+    fn prescribed(&self, tissue: &Tissue) -> Result<Prescribed<2>, InstallError> {
+        let mesh = &tissue.mesh;
+        let mut prescribed = Prescribed::none(mesh.vertex_count());
+        let mut imposed = [false; 2];
+        let mut first_vertex = None;
+        for (name, motion) in self.edges() {
+            let edge = tissue.edge(&name).ok_or_else(|| no_such_edge(&name, tissue))?;
+            let (normal, extent) = outward_normal(tissue, edge);
+            let component = axis_of(normal);
+            if motion.sideways == Sideways::Sliding && component.is_none() {
+                return Err(refuse(&name, "a sliding edge must be parallel to an axis; this one is not"));
+            }
+            let amplitude = |k: usize| motion.outward.0 * extent * normal[k] + motion.shift[k].0;
+            for vertex in tissue.edges[edge].iter().flat_map(|facet| mesh.facet_vertices(*facet)) {
+                first_vertex.get_or_insert(vertex as usize);
+                for k in (0..2).filter(|k| motion.sideways == Sideways::Held || component == Some(*k)) {
+                    prescribed.impose(vertex as usize, k, amplitude(k));
+                    imposed[k] = true;
+                }
+            }
+        }
+        for k in (0..2).filter(|k| !imposed[*k]) {
+            if let Some(vertex) = first_vertex {
+                prescribed.impose(vertex, k, 0.0);
+            }
+        }
+        Ok(prescribed)
+    }
+}
+
+impl Mechanism for Matrix {
+    const NAME: &'static str = "matrix";
+
+    fn check(&self, facts: &Facts) -> Violations {
+        let mut wrong = Violations::new();
+        for name in self.edges().keys().filter(|name| !facts.edges.contains(name)) {
+            wrong.push("/motion", unknown_name("edge", name, &facts.edges));
+        }
+        let LoadCurve { times, loads } = &self.load;
+        wrong.demand(times.len() == loads.len() && times.len() != 1, "/load", || {
+            format!("{} times and {} loads: give as many loads as times, two or more", times.len(), loads.len())
+        });
+        wrong.demand(times.windows(2).all(|w| w[0].0 < w[1].0), "/load/times", || "times must ascend".into());
+        wrong.demand(loads.iter().all(|s| (0.0..=1.0).contains(&s.0)), "/load/loads", || {
+            "each load lies in [0, 1]; larger motion goes into `motion`".into()
+        });
+        wrong
+    }
+
+    fn install(self, model: &mut ModelBuilder) -> Result<(), InstallError> {
+        let tissue = model.world.resource::<Tissue>();
+        let prescribed = self.prescribed(tissue)?;
+        let body = Body::new(&tissue.mesh, self.law()?, prescribed).map_err(solve_error)?;
+        let options = LoadPathOptions { tolerance: self.tolerance.0, ..LoadPathOptions::default() };
+        let path = LoadPath::solve(&body, &options)
+            .map_err(|error| InstallError::Solve(format!("the matrix (eq. 3) has no path to its full load: {error}{}", remedy(self.material))))?;
+        let duration = model.world.resource::<Clock>().grid.hours(model.world.resource::<Clock>().end);
+        record(model.world, &path);
+        model.insert(Loading { path, curve: self.load.clone(), duration }).insert_law(self);
+        model.motion(follow_load);
+        Ok(())
+    }
+}
+
+fn record(world: &mut World, path: &LoadPath) {
+    let report = path.report();
+    let mut counters = world.resource_mut::<Counters>();
+    counters.matrix_solves += report.solves as u64;
+    counters.newton_iterations += report.newton_iterations as u64;
+    let mut health = world.resource_mut::<Health>();
+    if !report.met {
+        health.note(format!("matrix: {} load levels were not enough; the path is within {:.1e}", report.levels, report.defect));
+    }
+    if let Some(load) = report.unstable_from {
+        health.note(format!("matrix: from load {load:.3} on the equilibrium is not stable (negative eigenvalue of the tangent)"));
+    }
+    world.resource_mut::<Configuration>().moves = true;
+}
+
+fn remedy(material: MaterialLaw) -> &'static str {
+    match material {
+        MaterialLaw::StVenantKirchhoff => {
+            ". St. Venant-Kirchhoff fails in compression; `\"material\": \"neo_hookean\"` goes further, as does less motion"
+        }
+        MaterialLaw::NeoHookean => ". Less motion, sliding instead of held edges, or a finer mesh may help",
+    }
+}
+
+fn solve_error(error: impl std::fmt::Display) -> InstallError {
+    InstallError::Solve(format!("the matrix (eq. 3): {error}"))
+}
+
+fn refuse(edge: &str, message: &str) -> InstallError {
+    InstallError::Scenario(Violation::new(format!("/motion/{edge}"), message))
+}
+
+fn no_such_edge(name: &str, tissue: &Tissue) -> InstallError {
+    refuse(name, &unknown_name("edge", name, &tissue.domain.edge_names))
+}
+
+/// Mean outward unit normal of an edge at rest, and the tissue's extent (µm) in that direction.
+fn outward_normal(tissue: &Tissue, edge: usize) -> ([f64; 2], f64) {
+    let rest = tissue.mesh.vertices();
+    let mut sum = [0.0; 2];
+    for facet in &tissue.edges[edge] {
+        let ends: Vec<_> = tissue.mesh.facet_vertices(*facet).map(|v| rest[v as usize]).collect();
+        sum = [sum[0] + ends[1][1] - ends[0][1], sum[1] + ends[0][0] - ends[1][0]];
+    }
+    let norm = sum[0].hypot(sum[1]).max(f64::MIN_POSITIVE);
+    let normal = sum.map(|x| x / norm);
+    let heights = rest.iter().map(|x| x[0] * normal[0] + x[1] * normal[1]);
+    let (low, high) = heights.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(x), h.max(x)));
+    (normal, high - low)
+}
+
+fn axis_of(normal: [f64; 2]) -> Option<usize> {
+    (0..2).find(|&k| (normal[k].abs() - 1.0).abs() < 1e-9)
+}
+
+/// The solved load path, and the load over time.
+#[derive(Debug, Resource)]
+pub struct Loading {
+    path: LoadPath,
+    curve: LoadCurve,
+    duration: f64,
+}
+
+impl Loading {
+    /// The path of equilibria over the load.
+    pub fn path(&self) -> &LoadPath {
+        &self.path
+    }
+
+    /// Load s and its rate ṡ (1/h) at a time (h); at a corner of the curve the rate is that of the piece before.
+    pub fn at(&self, time: f64) -> (f64, f64) {
+        let LoadCurve { times, loads } = &self.curve;
+        if times.is_empty() {
+            return (time / self.duration, 1.0 / self.duration);
+        }
+        let piece = times.partition_point(|t| t.0 < time);
+        if piece == 0 || piece == times.len() {
+            return (loads[piece.min(times.len() - 1)].0, 0.0);
+        }
+        let (start, end) = (times[piece - 1].0, times[piece].0);
+        let rate = (loads[piece].0 - loads[piece - 1].0) / (end - start);
+        (loads[piece - 1].0 + rate * (time - start), rate)
+    }
+
+    /// Coordinates (µm) and their derivative with respect to the load, at a load.
+    pub fn configuration(&self, rest: &[[f64; 2]], load: f64) -> (Vec<[f64; 2]>, Vec<[f64; 2]>) {
+        let mut flat = vec![0.0; 2 * rest.len()];
+        self.path.displacement(load, &mut flat);
+        let moved = rest.iter().zip(flat.chunks_exact(2)).map(|(x, u)| [x[0] + u[0], x[1] + u[1]]).collect();
+        self.path.rate(load, &mut flat);
+        (moved, flat.chunks_exact(2).map(|u| [u[0], u[1]]).collect())
+    }
+}
+
+/// Brings the configuration to the stage time.
+fn follow_load(
+    stage: Res<StageTime>,
+    tissue: Res<Tissue>,
+    loading: Res<Loading>,
+    mut configuration: ResMut<Configuration>,
+) {
+    if configuration.revision > 0 && configuration.time == stage.0 {
+        return;
+    }
+    let (load, rate) = loading.at(stage.0);
+    configuration.time = stage.0;
+    if configuration.revision > 0 && configuration.load == load && configuration.load_rate == rate {
+        return;
+    }
+    let (moved, slope) = loading.configuration(tissue.mesh.vertices(), load);
+    configuration.velocities = slope.into_iter().map(|u| u.map(|du| du * rate)).collect();
+    configuration.coordinates = moved;
+    (configuration.load, configuration.load_rate) = (load, rate);
+    configuration.revision += 1;
+    configuration.bound_inverse_stretch(&tissue.mesh);
+}

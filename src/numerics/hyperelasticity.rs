@@ -98,7 +98,7 @@ impl std::fmt::Display for WorstCell {
         let (cell, det) = (self.cell, self.jacobian);
         write!(
             out,
-            "cell {cell}, at rest at {:.1?} um, det F = {det:.4}, stretches {:.4?}",
+            "cell {cell}, at rest at {:.3?} um, det F = {det:.4}, stretches {:.4?}",
             self.position, self.stretches
         )
     }

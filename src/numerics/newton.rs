@@ -251,3 +251,113 @@ impl<'b, 'm, const D: usize> Newton<'b, 'm, D> {
 fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::sync::Arc;
+
+    use crate::numerics::hyperelasticity::Prescribed;
+    use crate::numerics::material::{Lame, Material, NeoHookean, StVenantKirchhoff};
+    use crate::numerics::simplex_mesh::{SimplexMesh, structured_rectangle};
+
+    fn lame() -> Lame {
+        Lame::from_young_poisson(1.0, 0.3).unwrap()
+    }
+
+    /// The lower edge clamped, the upper lifted by `lift` per unit load.
+    fn lifted<const D: usize>(mesh: &SimplexMesh<D>, material: Arc<dyn Material<D>>, lift: f64) -> Body<'_, D> {
+        let mut prescribed = Prescribed::none(mesh.vertex_count());
+        for (vertex, x) in mesh.vertices().iter().enumerate().filter(|(_, x)| x[D - 1] == 0.0 || x[D - 1] == 1.0) {
+            let mut amplitude = [0.0; D];
+            amplitude[D - 1] = lift * x[D - 1];
+            prescribed.impose_all(vertex, amplitude);
+        }
+        Body::new(mesh, material, prescribed).unwrap()
+    }
+
+    fn solve<const D: usize>(body: &Body<'_, D>, load: f64) -> Result<Equilibrium, EquilibriumError> {
+        equilibrium(body, load, &vec![0.0; body.unknowns()], &NewtonOptions::default())
+    }
+
+    #[test]
+    fn the_rate_is_the_derivative_of_the_equilibrium_and_the_energy_that_of_the_work() {
+        let mesh = structured_rectangle(1.5, 1.0, 6, 4).unwrap();
+        for material in [
+            Arc::new(NeoHookean { lame: lame() }) as Arc<dyn Material<2>>,
+            Arc::new(StVenantKirchhoff { lame: lame() }),
+        ] {
+            let body = lifted(&mesh, material, 0.3);
+            let [before, here, after] = [0.199, 0.2, 0.201].map(|load| solve(&body, load).unwrap());
+            for (i, rate) in here.rate.iter().enumerate() {
+                assert!(((after.displacement[i] - before.displacement[i]) / 0.002 - rate).abs() < 1e-6);
+            }
+            let forces = body.internal_forces(&here.displacement);
+            let work: f64 = forces.iter().zip(&here.rate).map(|(force, rate)| force * rate).sum();
+            assert!(((after.energy - before.energy) / 0.002 - work).abs() < 1e-7);
+            assert!(here.negative_eigenvalues == 0 && here.residual <= 1e-12);
+        }
+    }
+
+    #[test]
+    fn a_tetrahedral_bar_that_may_narrow_freely_has_the_uniaxial_closed_form() {
+        let vertices = (0..8).map(|v| [f64::from(v & 1), f64::from(v >> 1 & 1), f64::from(v >> 2)]).collect();
+        let cells = vec![0, 1, 3, 7, 0, 3, 2, 7, 0, 2, 6, 7, 0, 6, 4, 7, 0, 4, 5, 7, 0, 5, 1, 7];
+        let mesh = SimplexMesh::<3>::new(vertices, cells).unwrap();
+        let mut prescribed = Prescribed::none(8);
+        for (vertex, x) in mesh.vertices().iter().enumerate() {
+            (0..3).filter(|&c| x[c] == 0.0).for_each(|c| prescribed.impose(vertex, c, 0.0));
+            if x[2] == 1.0 {
+                prescribed.impose(vertex, 2, 0.2);
+            }
+        }
+        let body = Body::new(&mesh, Arc::new(StVenantKirchhoff { lame: lame() }), prescribed).unwrap();
+        let found = solve(&body, 1.0).unwrap();
+        // S = 0 across: E_across = −ν E_along, so λ_across² = 1 − ν(λ² − 1) and W = E/8 (λ² − 1)².
+        let across = (1.0 - 0.3 * 0.44f64).sqrt();
+        assert!((found.displacement[3 * 7] - (across - 1.0)).abs() < 1e-12);
+        assert!((found.energy - 0.44f64.powi(2) / 8.0).abs() < 1e-13);
+        assert!((found.min_jacobian - 1.2 * across * across).abs() < 1e-12);
+    }
+
+    #[test]
+    fn failures_name_their_reason_load_and_cell() {
+        let mesh = structured_rectangle(1.5, 1.0, 6, 4).unwrap();
+        let body = lifted(&mesh, Arc::new(StVenantKirchhoff { lame: lame() }), -0.6);
+        let error = solve(&body, 1.0).unwrap_err();
+        assert_eq!((error.load, &error.reason, error.iterations), (1.0, &Failure::Inverted, 0));
+        assert!((error.worst.jacobian + 1.4).abs() < 1e-12, "{error}");
+        assert!(error.worst.position[1] > 0.75, "{error}");
+        let guess = vec![f64::NAN; body.unknowns()];
+        let error = equilibrium(&body, 0.1, &guess, &NewtonOptions::default()).unwrap_err();
+        assert_eq!(error.reason, Failure::Guess);
+        assert_eq!(equilibrium(&body, 0.1, &[], &NewtonOptions::default()).unwrap_err().reason, Failure::Guess);
+        let hasty = NewtonOptions { max_iterations: 1, ..NewtonOptions::default() };
+        let error = equilibrium(&body, 0.1, &vec![0.0; body.unknowns()], &hasty).unwrap_err();
+        assert_eq!((error.reason, error.iterations), (Failure::NoConvergence, 1));
+    }
+
+    #[test]
+    fn a_body_with_nothing_free_is_moved_as_told() {
+        let mesh = structured_rectangle(1.0, 1.0, 2, 1).unwrap();
+        let body = lifted(&mesh, Arc::new(NeoHookean { lame: lame() }), 0.1);
+        let found = solve(&body, 0.5).unwrap();
+        assert!((found.min_jacobian - 1.05).abs() < 1e-15 && found.iterations == 1);
+        assert!((found.rate[2 * 5 + 1] - 0.1).abs() < 1e-16);
+    }
+
+    #[test]
+    fn a_step_that_would_invert_is_shortened_and_the_equilibrium_still_found() {
+        let mesh = structured_rectangle(1.5, 1.0, 6, 4).unwrap();
+        let body = lifted(&mesh, Arc::new(NeoHookean { lame: lame() }), -0.2);
+        // The top layer of cells is pressed to a fifth of its height by the bare jump of the border.
+        let jumped = solve(&body, 1.0).unwrap();
+        let half = solve(&body, 0.5).unwrap();
+        let guess: Vec<f64> = half.displacement.iter().zip(&half.rate).map(|(u, du)| u + 0.5 * du).collect();
+        let led = equilibrium(&body, 1.0, &guess, &NewtonOptions::default()).unwrap();
+        assert!(jumped.iterations > led.iterations);
+        for (a, b) in jumped.displacement.iter().zip(&led.displacement) {
+            assert!((a - b).abs() < 1e-11);
+        }
+    }
+}

@@ -12,8 +12,9 @@
 
 use std::sync::Arc;
 
-use nalgebra::DMatrix;
+pub use crate::numerics::imposed_motion::Prescribed;
 
+use crate::numerics::imposed_motion::largest_extent;
 use crate::numerics::material::{Material, Tensor, jacobian, principal_stretches};
 use crate::numerics::simplex_mesh::SimplexMesh;
 use crate::numerics::sparse::{PRESCRIBED, SparseError, SymmetricMatrix, SymmetricPattern};
@@ -48,36 +49,6 @@ pub enum BodyError {
     /// The pattern of the tangent could not be set up.
     #[error(transparent)]
     Sparse(#[from] SparseError),
-}
-
-/// The imposed motion: for every vertex and component, nothing, or an amplitude (µm) with `u = s·amplitude`.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Prescribed<const D: usize> {
-    amplitudes: Vec<[Option<f64>; D]>,
-}
-
-impl<const D: usize> Prescribed<D> {
-    /// Nothing imposed on any of `vertices` vertices.
-    pub fn none(vertices: usize) -> Self {
-        Self { amplitudes: vec![[None; D]; vertices] }
-    }
-
-    /// Imposes `u = s·amplitude` (µm) on one component of a vertex; amplitude zero holds it. Out of range: no effect.
-    pub fn impose(&mut self, vertex: usize, component: usize, amplitude: f64) {
-        if let Some(slot) = self.amplitudes.get_mut(vertex).and_then(|slots| slots.get_mut(component)) {
-            *slot = Some(amplitude);
-        }
-    }
-
-    /// Imposes `u = s·amplitude` on all components of a vertex: a clamp.
-    pub fn impose_all(&mut self, vertex: usize, amplitude: [f64; D]) {
-        (0..D).for_each(|component| self.impose(vertex, component, amplitude[component]));
-    }
-
-    /// The amplitudes, one entry a vertex.
-    pub fn amplitudes(&self) -> &[[Option<f64>; D]] {
-        &self.amplitudes
-    }
 }
 
 /// The cell that is compressed most: the smallest `det F`.
@@ -136,7 +107,7 @@ impl<'m, const D: usize> Body<'m, D> {
             .enumerate()
             .map(|(cell, rows)| mesh.barycentric_gradients(mesh.vertices(), cell, rows))
             .collect();
-        let (rows, free) = number_free(&prescribed);
+        let (rows, free) = prescribed.number_free();
         let elements: Vec<u32> =
             mesh.cells().iter().flat_map(|&v| rows[v as usize * D..(v as usize + 1) * D].iter().copied()).collect();
         let pattern = SymmetricPattern::from_elements(free, &elements, stride * D)?;
@@ -184,7 +155,7 @@ impl<'m, const D: usize> Body<'m, D> {
 
     /// Sets the prescribed components of a displacement to `load` times their amplitude.
     pub fn impose(&self, load: f64, displacement: &mut [f64]) {
-        for (slot, amplitude) in displacement.iter_mut().zip(self.prescribed.amplitudes.iter().flatten()) {
+        for (slot, amplitude) in displacement.iter_mut().zip(self.prescribed.amplitudes().iter().flatten()) {
             if let Some(amplitude) = amplitude {
                 *slot = load * amplitude;
             }
@@ -218,7 +189,7 @@ impl<'m, const D: usize> Body<'m, D> {
         let mut lowest = (f64::INFINITY, 0);
         for cell in 0..self.mesh.cell_count() {
             let j = jacobian(&self.deformation_gradient(displacement, cell));
-            if !(j >= lowest.0) {
+            if j.is_nan() || j < lowest.0 {
                 lowest = (j, cell);
             }
         }
@@ -318,74 +289,22 @@ impl<'m, const D: usize> Body<'m, D> {
     }
 }
 
-/// Rows of the free unknowns (or [`PRESCRIBED`]) and their number.
-fn number_free<const D: usize>(prescribed: &Prescribed<D>) -> (Vec<u32>, usize) {
-    let mut free = 0;
-    let row = |amplitude: &Option<f64>| match amplitude {
-        Some(_) => PRESCRIBED,
-        None => {
-            free += 1;
-            free - 1
-        }
-    };
-    let rows = prescribed.amplitudes.iter().flatten().map(row).collect();
-    (rows, free as usize)
-}
-
 fn check_prescribed<const D: usize>(mesh: &SimplexMesh<D>, prescribed: &Prescribed<D>) -> Result<(), BodyError> {
-    let (given, wanted) = (prescribed.amplitudes.len(), mesh.vertex_count());
+    let (given, wanted) = (prescribed.amplitudes().len(), mesh.vertex_count());
     if given != wanted {
         return Err(BodyError::Length { given, wanted });
     }
-    for (vertex, amplitudes) in prescribed.amplitudes.iter().enumerate() {
+    for (vertex, amplitudes) in prescribed.amplitudes().iter().enumerate() {
         for (component, amplitude) in amplitudes.iter().enumerate() {
             if let Some(amplitude) = amplitude.filter(|value| !value.is_finite()) {
                 return Err(BodyError::NotFinite { vertex, component, amplitude });
             }
         }
     }
-    if held_rigidly(mesh, prescribed) {
+    if prescribed.holds_rigidly(mesh.vertices()) {
         return Ok(());
     }
-    Err(BodyError::Floating { held: prescribed.amplitudes.iter().flatten().flatten().count() })
-}
-
-/// Whether no rigid motion (`D` translations, `D(D−1)/2` rotations) vanishes at all held components: the Gram matrix of the
-/// rigid motions there is regular.
-fn held_rigidly<const D: usize>(mesh: &SimplexMesh<D>, prescribed: &Prescribed<D>) -> bool {
-    let size = largest_extent(mesh.vertices());
-    let origin = mesh.vertices().first().copied().unwrap_or([0.0; D]);
-    let planes: Vec<(usize, usize)> = (0..D).flat_map(|i| (i + 1..D).map(move |j| (i, j))).collect();
-    let motions = D + planes.len();
-    let mut gram = DMatrix::<f64>::zeros(motions, motions);
-    for (x, held) in mesh.vertices().iter().zip(&prescribed.amplitudes) {
-        for component in (0..D).filter(|&component| held[component].is_some()) {
-            let arm = |axis: usize| (x[axis] - origin[axis]) / size;
-            let motion = |m: usize| match m.checked_sub(D).map(|plane| planes[plane]) {
-                None => f64::from(u8::from(m == component)),
-                Some((i, j)) if j == component => arm(i),
-                Some((i, j)) if i == component => -arm(j),
-                Some(_) => 0.0,
-            };
-            for a in 0..motions {
-                for b in 0..motions {
-                    gram[(a, b)] += motion(a) * motion(b);
-                }
-            }
-        }
-    }
-    let largest = gram.trace();
-    gram.symmetric_eigenvalues().min() > 1e-12 * largest
-}
-
-/// Largest side of the box around some points.
-fn largest_extent<const D: usize>(points: &[[f64; D]]) -> f64 {
-    let along = |k: usize| {
-        let bounds =
-            points.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x[k]), high.max(x[k])));
-        bounds.1 - bounds.0
-    };
-    (0..D).map(along).fold(0.0, f64::max)
+    Err(BodyError::Floating { held: prescribed.amplitudes().iter().flatten().flatten().count() })
 }
 
 fn small_strain_stiffness<const D: usize>(material: &dyn Material<D>) -> f64 {

@@ -130,7 +130,7 @@ impl<const D: usize> Material<D> for NeoHookean {
 
     fn energy(&self, gradient: &Tensor<D>) -> f64 {
         let j = jacobian(gradient);
-        if !(j > 0.0) {
+        if j.is_nan() || j <= 0.0 {
             return f64::INFINITY;
         }
         let Lame { lambda, mu } = self.lame;

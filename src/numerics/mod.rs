@@ -2,6 +2,7 @@
 
 pub mod hermite;
 pub mod hyperelasticity;
+pub mod imposed_motion;
 pub mod load_path;
 pub mod material;
 pub mod newton;

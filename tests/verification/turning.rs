@@ -66,9 +66,9 @@ fn an_euler_step_lengthens_the_heading_as_the_model_says() {
 #[test]
 fn a_pull_that_turns_is_followed_with_order_two_by_half_turns_at_midpoints() {
     // The pull rotates at Ω; relative to it β' = Ω − κ sin β has a steady lag asin(Ω/κ): the reference is that closed form.
-    let (rate, spin) = (3.0, 1.2);
+    let (rate, spin) = (3.0f64, 1.2f64);
     let pull = |time: f64| heading(spin * time);
-    let lag: f64 = -(spin / rate as f64).asin();
+    let lag = -(spin / rate).asin();
     let error = |steps: usize| {
         let step = 2.0 / steps as f64;
         let mut e = heading(lag);

@@ -51,8 +51,8 @@ impl<const D: usize> Prescribed<D> {
         (rows, free as usize)
     }
 
-    /// Whether, on a mesh with these vertices (µm), no rigid motion (`D` translations, `D(D−1)/2` rotations) vanishes at all held components: the Gram matrix of the
-    /// rigid motions there is regular.
+    /// Whether, on a mesh with these vertices (µm), no rigid motion (`D` translations, `D(D−1)/2` rotations) vanishes at all
+    /// held components. Assumes that the mesh is connected.
     pub fn holds_rigidly(&self, vertices: &[[f64; D]]) -> bool {
         let size = largest_extent(vertices);
         let origin = vertices.first().copied().unwrap_or([0.0; D]);

@@ -1,0 +1,170 @@
+//! Checks of a scene that compare keys with each other, which a schema cannot state.
+
+use std::collections::BTreeSet;
+
+use super::scene::{Births, Direction, Heading, Origin, Outline, Population, Ring, Scene, Tissue};
+use super::suggest::advice;
+use crate::model::quantity::{Time, format_number};
+use crate::model::shape::{Shape, check_ring, coordinates, distance_to_segment, polygon_contains, segments};
+use crate::model::violation::{Violations, pointer_token};
+
+/// A run of more steps than this would not end.
+const MOST_STEPS: f64 = 1e9;
+
+/// Vertices per area over h², for triangles near the equilateral one: 2/√3.
+const VERTICES_PER_SQUARE: f64 = 1.154_700_538_379_251_7;
+
+impl Scene {
+    /// Checks what no single key shows: edges and points that exist, intervals that run forward, a mesh and a number of steps that can
+    /// be afforded.
+    ///
+    /// # Errors
+    /// Every violation, with its pointer from the top of the scene.
+    pub fn check(&self) -> Result<(), Violations> {
+        self.check_except(&BTreeSet::new())
+    }
+
+    /// The same without the checks that look into one of the top-level keys named, which are known to be wrong already.
+    ///
+    /// # Errors
+    /// As for [`Scene::check`].
+    pub fn check_except(&self, broken: &BTreeSet<String>) -> Result<(), Violations> {
+        let sound = |names: &[&str]| !names.iter().any(|name| broken.contains(*name));
+        let mut violations = Violations::new();
+        let nameable = !self.name.contains(['/', '\\', '\0']) && ![".", ".."].contains(&self.name.as_str());
+        violations.demand(nameable || !sound(&["name"]), "/name", || {
+            format!("\"{}\" cannot be the name of a directory of results", self.name)
+        });
+        if sound(&["tissue"]) {
+            check_tissue(&self.tissue, &mut violations);
+        }
+        if sound(&["time"]) {
+            self.check_time(&mut violations);
+        }
+        for (name, population) in self.populations.iter().filter(|_| sound(&["populations"])) {
+            let pointer = format!("/populations{}", pointer_token(name));
+            if sound(&["tissue"]) {
+                check_origin(population, &self.tissue.outline, &pointer, &mut violations);
+            }
+            if sound(&["time"]) {
+                check_births(population, self.time.duration, &pointer, &mut violations);
+            }
+        }
+        for (name, target) in self.targets.iter().filter(|_| sound(&["targets"])) {
+            let pointer = format!("/targets{}", pointer_token(name));
+            check_target(target, sound(&["tissue"]).then_some(&self.tissue.outline), &pointer, &mut violations);
+        }
+        violations.into_result()
+    }
+
+    fn check_time(&self, violations: &mut Violations) {
+        let (duration, step) = (self.time.duration, self.time.step);
+        violations.demand(step <= duration, "/time/step", || format!("{step} is longer than the duration, {duration}"));
+        let steps = duration.0 / step.0;
+        violations.demand(steps <= MOST_STEPS, "/time/step", || {
+            format!("{steps:.1e} steps of {step} fill the duration of {duration}; at most {MOST_STEPS:e} are run")
+        });
+    }
+}
+
+fn check_tissue(tissue: &Tissue, violations: &mut Violations) {
+    if let Outline::Polygon { outer, holes } = &tissue.outline {
+        let mut found = Violations::new();
+        check_named_ring(outer, "/tissue/outline/polygon/outer", &mut found);
+        let border = outer.coordinates();
+        for (index, hole) in holes.iter().enumerate() {
+            let pointer = format!("/tissue/outline/polygon/holes/{index}");
+            check_named_ring(hole, &pointer, &mut found);
+            let outside = hole.coordinates().iter().position(|&point| !polygon_contains(&border, point));
+            if let Some(point) = outside {
+                found.push(format!("{pointer}/points/{point}"), "the hole reaches out of the outer border");
+            }
+        }
+        if !found.is_empty() {
+            return violations.extend_under("", found);
+        }
+    }
+    let vertices = VERTICES_PER_SQUARE * tissue.outline.area() / tissue.mesh_size.0.powi(2);
+    violations.demand(vertices <= tissue.max_vertices as f64, "/tissue/mesh_size", || {
+        let (size, most) = (tissue.mesh_size, tissue.max_vertices);
+        format!("triangles of {size} would need about {vertices:.1e} vertices; max_vertices is {most}")
+    });
+}
+
+fn check_named_ring(ring: &Ring, pointer: &str, violations: &mut Violations) {
+    let mut found = Violations::new();
+    check_ring(&ring.coordinates(), &format!("{pointer}/points"), &mut found);
+    violations.extend_under("", found);
+    let (sides, names) = (ring.points.len(), ring.edges.len());
+    violations.demand(names == 0 || names == sides, &format!("{pointer}/edges"), || {
+        format!("{names} names for {sides} sides; each side takes one")
+    });
+}
+
+fn check_origin(population: &Population, outline: &Outline, pointer: &str, violations: &mut Violations) {
+    match &population.origin {
+        Origin::Edge(origin) => {
+            let (part, names) = (origin.part(), outline.edge_names());
+            violations.demand(names.contains(&part.name), &format!("{pointer}/origin/edge"), || {
+                let names: Vec<&str> = names.iter().map(String::as_str).collect();
+                format!("the outline has no edge \"{}\"{}", part.name, advice(&part.name, "edges", &names, '"'))
+            });
+            violations.demand(part.from < part.to, &format!("{pointer}/origin/edge"), || {
+                format!("the part from {} to {} has no length", part.from, part.to)
+            });
+        }
+        Origin::Points(points) => {
+            for (index, point) in coordinates(points).into_iter().enumerate() {
+                violations.demand(is_inside(outline, point), &format!("{pointer}/origin/points/{index}"), || {
+                    format!("[{}, {}] lies outside the tissue", format_number(point[0]), format_number(point[1]))
+                });
+            }
+            let along = population.heading == Heading::Along(Direction::InnerNormal);
+            violations.demand(!along, &format!("{pointer}/heading"), || {
+                "points have no inner normal; give an angle such as 90".to_owned()
+            });
+        }
+    }
+}
+
+fn check_births(population: &Population, duration: Time, pointer: &str, violations: &mut Violations) {
+    let [from, to] = population.birth_interval(duration);
+    let pointer = format!("{pointer}/births");
+    if let Some(Births::Uniform { .. }) = population.births {
+        violations.demand(from <= to, &pointer, || format!("from {from} to {to} runs backwards"));
+    }
+    violations
+        .demand(from < duration, &pointer, || format!("the first birth, at {from}, is not before the end, {duration}"));
+}
+
+fn check_target(target: &Shape, outline: Option<&Outline>, pointer: &str, violations: &mut Violations) {
+    if let Err(found) = target.check() {
+        return violations.extend_under(pointer, found);
+    }
+    let reached = outline.is_none_or(|outline| meets(target, outline));
+    violations.demand(reached, pointer, || "the target lies outside the tissue".to_owned());
+}
+
+fn is_inside(outline: &Outline, point: [f64; 2]) -> bool {
+    let in_hole = |hole: &Ring| {
+        let ring = hole.coordinates();
+        let on_border = segments(&ring).any(|(a, b)| distance_to_segment(point, a, b) == 0.0);
+        !on_border && polygon_contains(&ring, point)
+    };
+    polygon_contains(&outline.outer().coordinates(), point) && !outline.holes().iter().any(in_hole)
+}
+
+/// Whether a target and the outer border have a point in common, judged by corners and, for a disc, by the distance of the border.
+fn meets(target: &Shape, outline: &Outline) -> bool {
+    let border = outline.outer().coordinates();
+    let covers_corner = border.iter().any(|&corner| target.contains(corner));
+    covers_corner
+        || match target {
+            Shape::Disc { centre, radius } => {
+                let centre = centre.map(|length| length.0);
+                let near = segments(&border).any(|(a, b)| distance_to_segment(centre, a, b) < radius.0);
+                near || polygon_contains(&border, centre)
+            }
+            Shape::Polygon { points } => coordinates(points).iter().any(|&point| polygon_contains(&border, point)),
+        }
+}

@@ -1,0 +1,122 @@
+//! The keys of the tissue at rest: its outline, the names of its edges, its mesh.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::keys;
+use crate::model::quantity::{Angle, Length};
+use crate::model::shape::{Point, coordinates, signed_area};
+
+keys! {
+    /// The tissue at rest and its mesh.
+    pub struct Tissue {
+        /// The border of the tissue at rest.
+        pub outline: Outline = Outline::default(),
+        /// The longest edge wanted in the mesh; a quarter of the decay length of a cue is an upper bound.
+        #[schemars(extend("exclusiveMinimum" = 0.0, "x-typical" = [2.0, 60.0]))]
+        pub mesh_size: Length = Length(15.0),
+        /// The smallest angle allowed in a triangle.
+        #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 33.0, "x-typical" = [15.0, 30.0]))]
+        pub min_angle: Angle = Angle(25.0),
+        /// A mesh with more vertices is refused.
+        #[schemars(extend("minimum" = 3))]
+        pub max_vertices: u64 = 1_000_000,
+    }
+
+    /// A closed line whose sides have names.
+    pub struct Ring {
+        /// The corners in order, either way round.
+        #[schemars(length(min = 3))]
+        pub points: Vec<Point> = Vec::new(),
+        /// The name of each side, from its point to the next; sides may share one. By default all are called `outer`, or `hole`.
+        pub edges: Vec<String> = Vec::new(),
+    }
+}
+
+/// The border of the tissue at rest.
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum Outline {
+    /// The rectangle from (0, 0) to (width, height); its edges are called `bottom`, `right`, `top` and `left`.
+    Rectangle {
+        /// The extent along x \[µm\].
+        #[schemars(extend("exclusiveMinimum" = 0.0))]
+        width: Length,
+        /// The extent along y \[µm\].
+        #[schemars(extend("exclusiveMinimum" = 0.0))]
+        height: Length,
+    },
+    /// Any polygon, with or without holes.
+    Polygon {
+        /// The outer border.
+        outer: Ring,
+        /// The borders of the holes.
+        #[serde(default)]
+        holes: Vec<Ring>,
+    },
+}
+
+impl Default for Outline {
+    fn default() -> Self {
+        Self::Rectangle { width: Length(800.0), height: Length(600.0) }
+    }
+}
+
+impl Outline {
+    /// The outer border \[µm\] and the names of its sides; those of a rectangle run counter-clockwise from the origin.
+    pub fn outer(&self) -> Ring {
+        match self {
+            Self::Rectangle { width, height } => {
+                let zero = Length(0.0);
+                let points = vec![[zero, zero], [*width, zero], [*width, *height], [zero, *height]];
+                Ring { points, edges: ["bottom", "right", "top", "left"].map(str::to_owned).to_vec() }
+            }
+            Self::Polygon { outer, .. } => outer.named("outer"),
+        }
+    }
+
+    /// The borders of the holes and the names of their sides.
+    pub fn holes(&self) -> Vec<Ring> {
+        match self {
+            Self::Rectangle { .. } => Vec::new(),
+            Self::Polygon { holes, .. } => holes.iter().map(|hole| hole.named("hole")).collect(),
+        }
+    }
+
+    /// The names of all edges, each once, in the order of the outline.
+    pub fn edge_names(&self) -> Vec<String> {
+        let mut names = Vec::new();
+        for name in std::iter::once(self.outer()).chain(self.holes()).flat_map(|ring| ring.edges) {
+            if !names.contains(&name) {
+                names.push(name);
+            }
+        }
+        names
+    }
+
+    /// The area of the tissue at rest \[µm²\].
+    pub fn area(&self) -> f64 {
+        let holes: f64 = self.holes().iter().map(Ring::area).sum();
+        self.outer().area() - holes
+    }
+}
+
+impl Ring {
+    /// The corners as plain numbers \[µm\].
+    pub fn coordinates(&self) -> Vec<[f64; 2]> {
+        coordinates(&self.points)
+    }
+
+    /// The area enclosed \[µm²\].
+    pub fn area(&self) -> f64 {
+        signed_area(&self.coordinates()).abs()
+    }
+
+    fn named(&self, default: &str) -> Self {
+        let mut ring = self.clone();
+        if ring.edges.is_empty() {
+            ring.edges = vec![default.to_owned(); ring.points.len()];
+        }
+        ring
+    }
+}

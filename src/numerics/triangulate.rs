@@ -13,8 +13,8 @@ use spade::{AngleLimit, ConstrainedDelaunayTriangulation, Point2, RefinementPara
 
 use crate::numerics::arrangement::Arrangement;
 use crate::numerics::planar_domain::{
-    DomainError, MERGE_TOLERANCE, Outline, PlanarDomain, bounding_box, cross, distance, dot, minus, nearest_on_side,
-    sides, signed_area,
+    DomainError, MERGE_TOLERANCE, Outline, PlanarDomain, bounding_box, cross, dot, minus, nearest_on_side, sides,
+    signed_area,
 };
 use crate::numerics::simplex_mesh::{MeshError, SimplexMesh};
 
@@ -385,7 +385,7 @@ fn regions(mesh: &SimplexMesh<2>, outlines: &[Outline]) -> Result<Vec<Vec<u32>>,
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::numerics::planar_domain::Ring;
+    use crate::numerics::planar_domain::{Ring, distance};
 
     fn paper_outlines() -> Vec<Outline> {
         let mut outlines = vec![Outline::disc([400.0, 540.0], 50.0, 15.0)];

@@ -3,7 +3,7 @@
 //! Segments that cross get a common point there, segments that touch or overlap share their points, and points closer than
 //! a tolerance become one. All results depend on the order of the input alone.
 
-use crate::numerics::planar_domain::{bounding_box, cross, distance, minus, nearest_on_side};
+use crate::numerics::polygon::{bounding_box, cross, distance, minus, nearest_on_side};
 
 type Segment = [[f64; 2]; 2];
 

@@ -7,7 +7,7 @@
 
 use std::collections::HashMap;
 
-use crate::numerics::planar_domain::{cross, dot, minus};
+use crate::numerics::polygon::{cross, dot, minus};
 use crate::numerics::simplex_mesh::BORDER;
 
 /// Sums of cotangents above this (negative) value count as Delaunay: four points on a circle, to round-off.

@@ -21,33 +21,14 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
+use crate::numerics::cue_element::{Element, assemble, divergence};
+pub use crate::numerics::cue_element::{Mass, ReactionDiffusion};
 use crate::numerics::delaunay::{EdgeReport, Triangles, region_labels};
 use crate::numerics::simplex_mesh::{MeshError, SimplexMesh};
-use crate::numerics::sparse::{Factor, SparseError, SymmetricMatrix, SymmetricPattern};
+use crate::numerics::sparse::{Factor, SparseError, SymmetricPattern};
 
 /// Connectivities whose symbolic factor is kept, the original apart.
 const KEPT_FLIPS: usize = 8;
-
-/// How the decay term is integrated.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Mass {
-    /// Row sums on the diagonal: non-negative solutions on Delaunay meshes; the default.
-    #[default]
-    Lumped,
-    /// The exact integral: smaller errors where `k h²/D` is not small, but solutions may go negative.
-    Consistent,
-}
-
-/// The coefficients of eq. (2).
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ReactionDiffusion {
-    /// Diffusion D (µm²/h), positive.
-    pub diffusion: f64,
-    /// Degradation k (1/h), positive: without flux through the border `k = 0` has no stationary state.
-    pub degradation: f64,
-    /// How the decay term is integrated.
-    pub mass: Mass,
-}
 
 /// A release region: the whole cells of a fitted mesh.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -396,82 +377,6 @@ impl<const D: usize> StationarySystem<'_, D> {
     }
 }
 
-/// Geometry of one cell.
-struct Element<'a, const D: usize> {
-    corners: &'a [u32],
-    gradients: [[f64; D]; 4],
-    volume: f64,
-}
-
-impl<'a, const D: usize> Element<'a, D> {
-    fn new(mesh: &'a SimplexMesh<D>, coordinates: &[[f64; D]], cell: usize) -> Self {
-        let mut gradients = [[0.0; D]; 4];
-        let volume = mesh.barycentric_gradients(coordinates, cell, &mut gradients[..=D]);
-        Self { corners: mesh.cell(cell), gradients, volume }
-    }
-
-    /// Entry `(i, j)` of the mass matrix over V.
-    fn mass(mass: Mass, i: usize, j: usize) -> f64 {
-        let d = D as f64;
-        match (mass, i == j) {
-            (Mass::Lumped, true) => 1.0 / (d + 1.0),
-            (Mass::Lumped, false) => 0.0,
-            (Mass::Consistent, true) => 2.0 / ((d + 1.0) * (d + 2.0)),
-            (Mass::Consistent, false) => 1.0 / ((d + 1.0) * (d + 2.0)),
-        }
-    }
-
-    fn matrix(&self, law: &ReactionDiffusion, i: usize, j: usize) -> f64 {
-        let stiffness = law.diffusion * dot(&self.gradients[i], &self.gradients[j]);
-        self.volume * (stiffness + law.degradation * Self::mass(law.mass, i, j))
-    }
-
-    /// `∇w` of a nodal velocity: row k, column l holds ∂w_k/∂x_l.
-    fn velocity_gradient(&self, velocity: &[[f64; D]]) -> [[f64; D]; D] {
-        let mut gradient = [[0.0; D]; D];
-        for (corner, &vertex) in self.corners.iter().enumerate() {
-            for k in 0..D {
-                (0..D).for_each(|l| gradient[k][l] += velocity[vertex as usize][k] * self.gradients[corner][l]);
-            }
-        }
-        gradient
-    }
-
-    /// Subtracts `K' c` of the cell from `rate`.
-    fn subtract_matrix_rate(&self, law: &ReactionDiffusion, velocity: &[[f64; D]], field: &[f64], rate: &mut [f64]) {
-        let w = self.velocity_gradient(velocity);
-        let divergence = divergence(&w);
-        let mut slope = [0.0; D];
-        for (corner, &vertex) in self.corners.iter().enumerate() {
-            (0..D).for_each(|k| slope[k] += field[vertex as usize] * self.gradients[corner][k]);
-        }
-        let flux: [f64; D] = std::array::from_fn(|k| {
-            let strained: f64 = (0..D).map(|l| (w[k][l] + w[l][k]) * slope[l]).sum();
-            law.diffusion * (divergence * slope[k] - strained)
-        });
-        for (i, &vertex) in self.corners.iter().enumerate() {
-            let decay: f64 =
-                self.corners.iter().enumerate().map(|(j, &v)| Self::mass(law.mass, i, j) * field[v as usize]).sum();
-            let change = dot(&self.gradients[i], &flux) + law.degradation * divergence * decay;
-            rate[vertex as usize] -= self.volume * change;
-        }
-    }
-}
-
-fn assemble<const D: usize>(
-    law: &ReactionDiffusion,
-    mesh: &SimplexMesh<D>,
-    coordinates: &[[f64; D]],
-    pattern: &Arc<SymmetricPattern>,
-) -> SymmetricMatrix {
-    let mut matrix = SymmetricMatrix::zero(pattern);
-    for cell in 0..mesh.cell_count() {
-        let element = Element::new(mesh, coordinates, cell);
-        matrix.add_element(cell, |i, j| element.matrix(law, i, j));
-    }
-    matrix
-}
-
 fn check_law(law: &ReactionDiffusion) -> Result<(), ReactionDiffusionError> {
     if !(law.diffusion > 0.0 && law.diffusion.is_finite()) {
         return Err(ReactionDiffusionError::Diffusion(law.diffusion));
@@ -496,7 +401,7 @@ fn check_volumes<const D: usize>(
     coordinates: &[[f64; D]],
 ) -> Result<(), ReactionDiffusionError> {
     let volumes = (0..mesh.cell_count()).map(|cell| (cell, mesh.volume(coordinates, cell)));
-    match volumes.into_iter().find(|(_, volume)| !(*volume > 0.0)) {
+    match volumes.into_iter().find(|(_, volume)| *volume <= 0.0 || volume.is_nan()) {
         Some((cell, volume)) => Err(ReactionDiffusionError::Inverted { cell, volume }),
         None => Ok(()),
     }
@@ -504,12 +409,4 @@ fn check_volumes<const D: usize>(
 
 fn in_plane<const D: usize>(coordinates: &[[f64; D]]) -> Option<Vec<[f64; 2]>> {
     (D == 2).then(|| coordinates.iter().map(|x| [x[0], x[D - 1]]).collect())
-}
-
-fn divergence<const D: usize>(gradient: &[[f64; D]; D]) -> f64 {
-    (0..D).map(|k| gradient[k][k]).sum()
-}
-
-fn dot<const D: usize>(a: &[f64; D], b: &[f64; D]) -> f64 {
-    (0..D).map(|k| a[k] * b[k]).sum()
 }

@@ -15,6 +15,7 @@
 //! the normals. Re-entrant corners, where the gradient is singular, are left alone.
 
 use crate::numerics::simplex_mesh::SimplexMesh;
+use crate::numerics::vector::{between, dot, norm, orthonormal, without};
 
 /// Most terms of a quadratic (in space).
 const TERMS: usize = 10;
@@ -201,7 +202,7 @@ impl<const D: usize> GradientRecovery<D> {
             several => {
                 let at = coordinates[vertex];
                 let convex = range.flat_map(|facet| self.facets[facet]).all(|other| {
-                    let away: [f64; D] = std::array::from_fn(|k| coordinates[other as usize][k] - at[k]);
+                    let away = between(&at, &coordinates[other as usize]);
                     several.iter().all(|normal| dot(&away, normal) <= 0.1 * norm(&away) * norm(normal))
                 });
                 if convex { Constraint::Span(orthonormal(several)) } else { Constraint::Free }
@@ -326,40 +327,10 @@ fn starts(count: usize, sorted: impl Iterator<Item = u32>) -> Vec<u32> {
 /// Normal of a facet, away from the vertex `opposite`, as long as the facet is large (up to a constant).
 fn outward<const D: usize>(coordinates: &[[f64; D]], facet: &[u32; D], opposite: u32) -> [f64; D] {
     let origin = coordinates[facet[0] as usize];
-    let to = |vertex: u32| -> [f64; D] { std::array::from_fn(|k| coordinates[vertex as usize][k] - origin[k]) };
+    let to = |vertex: u32| between(&origin, &coordinates[vertex as usize]);
     let along: Vec<[f64; D]> = facet[1..].iter().map(|&vertex| to(vertex)).collect();
     let size: f64 = along.iter().map(norm).product();
     let inward = without(to(opposite), &orthonormal(&along));
     let scale = -size / norm(&inward).max(f64::MIN_POSITIVE);
     inward.map(|x| x * scale)
-}
-
-/// Orthonormal vectors with the span of the given ones.
-fn orthonormal<const D: usize>(vectors: &[[f64; D]]) -> Vec<[f64; D]> {
-    let mut found: Vec<[f64; D]> = Vec::new();
-    for vector in vectors {
-        let rest = without(*vector, &found);
-        let length = norm(&rest);
-        if length > 1e-6 * norm(vector) && found.len() < D {
-            found.push(rest.map(|x| x / length));
-        }
-    }
-    found
-}
-
-/// The part of a vector perpendicular to orthonormal ones.
-fn without<const D: usize>(mut vector: [f64; D], orthonormal: &[[f64; D]]) -> [f64; D] {
-    for unit in orthonormal {
-        let along = dot(&vector, unit);
-        (0..D).for_each(|k| vector[k] -= along * unit[k]);
-    }
-    vector
-}
-
-fn dot<const D: usize>(a: &[f64; D], b: &[f64; D]) -> f64 {
-    (0..D).map(|k| a[k] * b[k]).sum()
-}
-
-fn norm<const D: usize>(a: &[f64; D]) -> f64 {
-    dot(a, a).sqrt()
 }

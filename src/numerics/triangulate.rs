@@ -7,20 +7,13 @@
 //!
 //! Vertices and cells are numbered along a Morton curve: neighbours in the plane are neighbours in memory.
 
-use std::collections::HashMap;
-
 use spade::{AngleLimit, ConstrainedDelaunayTriangulation, Point2, RefinementParameters, Triangulation};
 
 use crate::numerics::arrangement::Arrangement;
-use crate::numerics::planar_domain::{
-    DomainError, MERGE_TOLERANCE, Outline, PlanarDomain, bounding_box, cross, dot, minus, nearest_on_side, sides,
-    signed_area,
-};
+use crate::numerics::lattice::lattice;
+use crate::numerics::planar_domain::{DomainError, Outline, PlanarDomain};
+use crate::numerics::polygon::{MERGE_TOLERANCE, bounding_box, cross, dot, minus, nearest_on_side, sides, signed_area};
 use crate::numerics::simplex_mesh::{MeshError, SimplexMesh};
-
-/// Distance that the lattice keeps from border and outlines, in units of the size: far enough that no sampled edge is
-/// encroached.
-const CLEARANCE: f64 = 0.6;
 
 /// How fine and how good the mesh shall be.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -196,13 +189,16 @@ fn check_inside(domain: &PlanarDomain, index: usize, outline: &Outline) -> Resul
     }
 }
 
+/// Vertices, and triangles by their numbers.
+type Soup = (Vec<[f64; 2]>, Vec<[u32; 3]>);
+
 type Cdt = ConstrainedDelaunayTriangulation<Point2<f64>>;
 
 fn refined_triangles(
     domain: &PlanarDomain,
     constraints: &Arrangement,
     options: &MeshOptions,
-) -> Result<(Vec<[f64; 2]>, Vec<[u32; 3]>), TriangulationError> {
+) -> Result<Soup, TriangulationError> {
     let too_many = TriangulationError::TooManyVertices { limit: options.max_vertices, size: options.size };
     let [low, high] = bounding_box(&domain.outer.points);
     let expected = (high[0] - low[0]) * (high[1] - low[1]) / (options.size * options.size);
@@ -232,84 +228,6 @@ fn refined_triangles(
     let vertices = cdt.vertices().map(|v| [v.position().x, v.position().y]).collect();
     let triangles = cdt.inner_faces().map(|face| face.vertices().map(|v| v.index() as u32)).collect();
     Ok((vertices, triangles))
-}
-
-/// Points of an equilateral lattice that keep their distance from all constraints. Where the domain is not convex the
-/// lattice also fills a box around it, so that refinement finds nothing to mend outside.
-fn lattice(domain: &PlanarDomain, constraints: &Arrangement, size: f64) -> Vec<[f64; 2]> {
-    let near = NearConstraints::new(constraints, size);
-    let convex = is_convex(&domain.outer.points);
-    let [mut low, mut high] = domain.bounding_box();
-    let mut points = Vec::new();
-    if !convex {
-        (0..2).for_each(|i| (low[i], high[i]) = (low[i] - 2.0 * size, high[i] + 2.0 * size));
-        let frame = Outline::rectangle(low, high);
-        let sides: Vec<_> = sides(&frame.points).collect();
-        points = Arrangement::new(&sides, 0.0).sampled(size).points;
-    }
-    let columns = ((high[0] - low[0]) / size).round().max(1.0);
-    let rows = ((high[1] - low[1]) / (size * 0.75_f64.sqrt())).round().max(1.0);
-    let [dx, dy] = [(high[0] - low[0]) / columns, (high[1] - low[1]) / rows];
-    for row in 1..rows as usize {
-        let shift = if row % 2 == 0 { 0.0 } else { 0.5 };
-        for column in 0..=columns as usize {
-            let point = [low[0] + dx * (column as f64 + shift), low[1] + dy * row as f64];
-            let away_from_frame = point[0] - low[0] >= CLEARANCE * size && high[0] - point[0] >= CLEARANCE * size;
-            let wanted = if convex { domain_fills(domain, point) } else { away_from_frame };
-            if wanted && !near.within(point, CLEARANCE * size) {
-                points.push(point);
-            }
-        }
-    }
-    points
-}
-
-fn domain_fills(domain: &PlanarDomain, point: [f64; 2]) -> bool {
-    domain.contains(point) || domain.holes.iter().any(|hole| Outline::new(hole.points.clone()).contains(point))
-}
-
-fn is_convex(points: &[[f64; 2]]) -> bool {
-    let n = points.len();
-    (0..n).all(|i| {
-        let (a, b, c) = (points[i], points[(i + 1) % n], points[(i + 2) % n]);
-        cross(minus(b, a), minus(c, b)) >= 0.0
-    })
-}
-
-/// Short segments binned by their middle, so that "is one near?" costs a few look-ups.
-struct NearConstraints<'a> {
-    constraints: &'a Arrangement,
-    size: f64,
-    bins: HashMap<[i64; 2], Vec<u32>>,
-}
-
-impl<'a> NearConstraints<'a> {
-    fn new(constraints: &'a Arrangement, size: f64) -> Self {
-        let mut near = Self { constraints, size, bins: HashMap::new() };
-        for (index, _) in constraints.segments.iter().enumerate() {
-            let [a, b] = near.side(index as u32);
-            let middle = [0.5 * (a[0] + b[0]), 0.5 * (a[1] + b[1])];
-            near.bins.entry(near.bin(middle)).or_default().push(index as u32);
-        }
-        near
-    }
-
-    fn side(&self, segment: u32) -> [[f64; 2]; 2] {
-        self.constraints.segments[segment as usize].map(|point| self.constraints.points[point as usize])
-    }
-
-    fn bin(&self, point: [f64; 2]) -> [i64; 2] {
-        point.map(|x| (x / self.size).floor() as i64)
-    }
-
-    /// `reach` may be up to 1.5 sizes: a segment's middle is at most half a size from its ends.
-    fn within(&self, point: [f64; 2], reach: f64) -> bool {
-        let [i, j] = self.bin(point);
-        (-2..=2).flat_map(|di| (-2..=2).map(move |dj| [i + di, j + dj])).any(|bin| {
-            let segments = self.bins.get(&bin);
-            segments.is_some_and(|s| s.iter().any(|&s| nearest_on_side(self.side(s), point).distance < reach))
-        })
-    }
 }
 
 /// Drops what is outside, and numbers the rest along a Morton curve.
@@ -374,7 +292,7 @@ fn regions(mesh: &SimplexMesh<2>, outlines: &[Outline]) -> Result<Vec<Vec<u32>>,
         let cells: Vec<u32> = (0..mesh.cell_count() as u32).filter(inside).collect();
         let area: f64 = cells.iter().map(|&cell| mesh.volume(mesh.vertices(), cell as usize)).sum();
         let wanted = signed_area(&outline.points).abs();
-        if !((area - wanted).abs() <= 1e-9 * wanted) {
+        if (area - wanted).abs() > 1e-9 * wanted {
             return Err(TriangulationError::NotFitted { outline: index, area, wanted });
         }
         regions.push(cells);
@@ -385,7 +303,9 @@ fn regions(mesh: &SimplexMesh<2>, outlines: &[Outline]) -> Result<Vec<Vec<u32>>,
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::numerics::planar_domain::{Ring, distance};
+    use crate::numerics::delaunay::Triangles;
+    use crate::numerics::planar_domain::Ring;
+    use crate::numerics::polygon::distance;
 
     fn paper_outlines() -> Vec<Outline> {
         let mut outlines = vec![Outline::disc([400.0, 540.0], 50.0, 15.0)];
@@ -408,12 +328,6 @@ mod tests {
         let domain = PlanarDomain::rectangle(800.0, 600.0);
         let outlines = paper_outlines();
         let fitted = triangulate(&domain, &outlines, &MeshOptions::of_size(15.0)).unwrap();
-        println!(
-            "{} vertices, {} cells, {}°",
-            fitted.mesh.vertex_count(),
-            fitted.mesh.cell_count(),
-            fitted.min_angle.to_degrees()
-        );
         assert!(fitted.min_angle.to_degrees() >= 25.0, "{}", fitted.min_angle.to_degrees());
         assert!((2000..4000).contains(&fitted.mesh.vertex_count()), "{}", fitted.mesh.vertex_count());
         assert!((total_area(&fitted) / 480_000.0 - 1.0).abs() < 1e-13);
@@ -473,6 +387,30 @@ mod tests {
             assert!((lengths[edge] / wanted - 1.0).abs() < 1e-12);
         }
         assert!(lengths[3] > 2.0 * 3.0 * 15.0);
+    }
+
+    proptest::proptest! {
+        #![proptest_config(proptest::prelude::ProptestConfig {
+            failure_persistence: None,
+            ..proptest::prelude::ProptestConfig::with_cases(40)
+        })]
+
+        #[test]
+        fn discs_anywhere_inside_are_fitted_however_they_overlap(
+            discs in proptest::collection::vec((0.0..1.0f64, 0.0..1.0f64, 2.0..25.0f64), 1..5),
+        ) {
+            let place = |share: f64, radius: f64, extent: f64| 1.05 * radius + share * (extent - 2.1 * radius);
+            let disc = |&(x, y, r): &(f64, f64, f64)| Outline::disc([place(x, r, 120.0), place(y, r, 80.0)], r, 6.0);
+            let outlines: Vec<_> = discs.iter().map(disc).collect();
+            let domain = PlanarDomain::rectangle(120.0, 80.0);
+            let fitted = triangulate(&domain, &outlines, &MeshOptions::of_size(6.0)).unwrap();
+            proptest::prop_assert!((total_area(&fitted) / 9600.0 - 1.0).abs() < 1e-12);
+            for (region, outline) in outlines.iter().enumerate() {
+                proptest::prop_assert!((region_area(&fitted, region) / outline.area() - 1.0).abs() < 1e-12);
+            }
+            let report = Triangles::new(fitted.mesh.cells()).edge_report(fitted.mesh.vertices(), 1.0, 0.0);
+            proptest::prop_assert!(report.monotone_lumped(), "{:?}", report);
+        }
     }
 
     #[test]

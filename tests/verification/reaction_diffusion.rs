@@ -143,7 +143,6 @@ fn a_disc_source_in_a_disc_converges_to_the_bessel_solution() {
         errors.push(squares.sqrt());
     }
     let order = fitted_order(&errors);
-    println!("radial: {errors:?} order {order}");
     assert!(order > 1.8 && errors[2] < 2e-3, "{errors:?} order {order}");
 }
 
@@ -211,11 +210,6 @@ fn a_stretch_breaks_delaunay_and_with_it_positivity_but_flips_mend_both() {
         let unmended = rigid.system(&law, &x).unwrap();
         let unmended_report = unmended.edge_report().unwrap();
         let negative = unmended.solve(&sources).unwrap().into_iter().fold(f64::INFINITY, f64::min);
-        println!(
-            "flipped {} {report:?} min {}; not: {unmended_report:?} min {negative}",
-            system.is_flipped(),
-            budget.minimum
-        );
         assert!(system.is_flipped() && !unmended.is_flipped());
         assert!(unmended_report.not_delaunay > 50 && negative < 0.0);
         assert!(report.not_delaunay <= 4 && budget.minimum >= 0.0);

@@ -1,7 +1,9 @@
-//! The mathematics against closed forms and independent references.
+//! Does the code solve the equations? Closed forms, manufactured solutions and independent references.
 
 mod block;
 mod elasticity;
 mod equilibria;
+mod gradient_recovery;
 mod load_path;
+mod reaction_diffusion;
 mod turning;

@@ -1,0 +1,151 @@
+//! Line segments cut where they meet: what a constrained triangulation can take without surprises.
+//!
+//! Segments that cross get a common point there, segments that touch or overlap share their points, and points closer than
+//! a tolerance become one. All results depend on the order of the input alone.
+
+use crate::numerics::polygon::{bounding_box, cross, distance, minus, nearest_on_side};
+
+type Segment = [[f64; 2]; 2];
+
+/// Points, and segments between them that meet nowhere but in their ends.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Arrangement {
+    /// Distinct points (µm).
+    pub points: Vec<[f64; 2]>,
+    /// Segments, each by its two points, none twice.
+    pub segments: Vec<[u32; 2]>,
+}
+
+impl Arrangement {
+    /// Cuts `segments` at all common points; points within `tolerance` (µm) are one. The time is quadratic in their number.
+    pub fn new(segments: &[Segment], tolerance: f64) -> Self {
+        let mut points = Vec::new();
+        let ends: Vec<[u32; 2]> = segments
+            .iter()
+            .map(|&[a, b]| [merge(&mut points, a, tolerance), merge(&mut points, b, tolerance)])
+            .collect();
+        let mut cuts: Vec<Vec<(f64, u32)>> = ends.iter().map(|&[a, b]| vec![(0.0, a), (1.0, b)]).collect();
+        for i in 0..segments.len() {
+            for j in i + 1..segments.len() {
+                if !apart(&segments[i], &segments[j], tolerance) {
+                    let pair = Pair { indices: [i, j], sides: [segments[i], segments[j]], ends: [ends[i], ends[j]] };
+                    pair.cut(&mut points, &mut cuts, tolerance);
+                }
+            }
+        }
+        Self { points, segments: join(cuts) }
+    }
+
+    /// The same segments, each divided evenly into pieces no longer than `size` (µm).
+    pub fn sampled(&self, size: f64) -> Self {
+        let mut points = self.points.clone();
+        let mut segments = Vec::new();
+        for &[from, to] in &self.segments {
+            let (a, b) = (self.points[from as usize], self.points[to as usize]);
+            let pieces = (distance(a, b) / size - 1e-9).ceil().max(1.0) as usize;
+            let mut last = from;
+            for piece in 1..pieces {
+                let share = piece as f64 / pieces as f64;
+                points.push([a[0] + share * (b[0] - a[0]), a[1] + share * (b[1] - a[1])]);
+                let next = (points.len() - 1) as u32;
+                segments.push([last, next]);
+                last = next;
+            }
+            segments.push([last, to]);
+        }
+        Self { points, segments }
+    }
+}
+
+struct Pair {
+    indices: [usize; 2],
+    sides: [Segment; 2],
+    ends: [[u32; 2]; 2],
+}
+
+impl Pair {
+    fn cut(&self, points: &mut Vec<[f64; 2]>, cuts: &mut [Vec<(f64, u32)>], tolerance: f64) {
+        let mut touched = false;
+        for (one, other) in [(0, 1), (1, 0)] {
+            for end in self.ends[other] {
+                let point = points[end as usize];
+                if nearest_on_side(self.sides[one], point).distance <= tolerance {
+                    cuts[self.indices[one]].push((share_of(self.sides[one], point), end));
+                    touched = true;
+                }
+            }
+        }
+        let [[a, b], [c, d]] = self.sides;
+        let (first, second) = (minus(b, a), minus(d, c));
+        let divisor = cross(first, second);
+        let s = cross(minus(c, a), second) / divisor;
+        let t = cross(minus(c, a), first) / divisor;
+        if !touched && (0.0..=1.0).contains(&s) && (0.0..=1.0).contains(&t) {
+            let point = merge(points, [a[0] + s * first[0], a[1] + s * first[1]], tolerance);
+            cuts[self.indices[0]].push((s, point));
+            cuts[self.indices[1]].push((t, point));
+        }
+    }
+}
+
+fn merge(points: &mut Vec<[f64; 2]>, point: [f64; 2], tolerance: f64) -> u32 {
+    let near = points.iter().position(|p| distance(*p, point) <= tolerance);
+    near.unwrap_or_else(|| {
+        points.push(point);
+        points.len() - 1
+    }) as u32
+}
+
+fn apart(a: &Segment, b: &Segment, tolerance: f64) -> bool {
+    let ([a_low, a_high], [b_low, b_high]) = (bounding_box(a), bounding_box(b));
+    (0..2).any(|i| a_low[i] > b_high[i] + tolerance || b_low[i] > a_high[i] + tolerance)
+}
+
+fn share_of([a, b]: Segment, point: [f64; 2]) -> f64 {
+    let along = minus(b, a);
+    let away = minus(point, a);
+    (along[0] * away[0] + along[1] * away[1]) / (along[0] * along[0] + along[1] * along[1])
+}
+
+fn join(mut cuts: Vec<Vec<(f64, u32)>>) -> Vec<[u32; 2]> {
+    let mut known = std::collections::BTreeSet::new();
+    let mut segments = Vec::new();
+    for cut in &mut cuts {
+        cut.sort_by(|a, b| a.0.total_cmp(&b.0));
+        for pair in cut.windows(2) {
+            let (a, b) = (pair[0].1, pair[1].1);
+            if a != b && known.insert((a.min(b), a.max(b))) {
+                segments.push([a, b]);
+            }
+        }
+    }
+    segments
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_cross_becomes_four_segments_with_one_common_point() {
+        let cross = Arrangement::new(&[[[0.0, 0.0], [2.0, 2.0]], [[0.0, 2.0], [2.0, 0.0]]], 1e-9);
+        assert_eq!((cross.points.len(), cross.segments.len()), (5, 4));
+        assert!(distance(cross.points[4], [1.0, 1.0]) < 1e-15);
+    }
+
+    #[test]
+    fn overlapping_segments_share_their_common_part() {
+        let overlap = Arrangement::new(&[[[0.0, 0.0], [3.0, 0.0]], [[1.0, 1e-11], [5.0, 0.0]]], 1e-9);
+        assert_eq!((overlap.points.len(), overlap.segments.len()), (4, 3));
+        let tee = Arrangement::new(&[[[0.0, 0.0], [3.0, 0.0]], [[1.0, 0.0], [1.0, 5.0]]], 1e-9);
+        assert_eq!((tee.points.len(), tee.segments.len()), (4, 3));
+    }
+
+    #[test]
+    fn sampling_leaves_no_piece_longer_than_asked() {
+        let sampled = Arrangement::new(&[[[0.0, 0.0], [3.1, 0.0]], [[0.0, 0.0], [0.0, 3.0]]], 1e-9).sampled(1.0);
+        assert_eq!(sampled.segments.len(), 4 + 3);
+        let length = |s: &[u32; 2]| distance(sampled.points[s[0] as usize], sampled.points[s[1] as usize]);
+        assert!(sampled.segments.iter().all(|s| length(s) <= 1.0 + 1e-12));
+    }
+}

@@ -1,0 +1,118 @@
+//! Plane geometry of closed polygons, given by their corners (µm); the last is joined to the first.
+
+/// Relative length (of the bounding box's diagonal) under which two points count as one.
+pub const MERGE_TOLERANCE: f64 = 1e-10;
+
+/// The nearest point of a named edge.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct NearestOnEdge {
+    /// Distance (µm).
+    pub distance: f64,
+    /// The nearest point itself (µm).
+    pub point: [f64; 2],
+    /// Unit normal of the side there, pointing into the domain.
+    pub inner_normal: [f64; 2],
+}
+
+/// The sides of a closed polygon, `[from, to]`.
+pub fn sides(points: &[[f64; 2]]) -> impl Iterator<Item = [[f64; 2]; 2]> + '_ {
+    (0..points.len()).map(move |i| [points[i], points[(i + 1) % points.len()]])
+}
+
+/// Signed area of a closed polygon (µm²), positive if counter-clockwise.
+pub fn signed_area(points: &[[f64; 2]]) -> f64 {
+    let Some(&origin) = points.first() else { return 0.0 };
+    sides(points).map(|[a, b]| 0.5 * cross(minus(a, origin), minus(b, origin))).sum()
+}
+
+/// Nearest point of a side to a point, with the side's left normal.
+pub fn nearest_on_side([from, to]: [[f64; 2]; 2], point: [f64; 2]) -> NearestOnEdge {
+    let along = minus(to, from);
+    let length_squared = dot(along, along);
+    let share =
+        if length_squared > 0.0 { (dot(minus(point, from), along) / length_squared).clamp(0.0, 1.0) } else { 0.0 };
+    let nearest = [from[0] + share * along[0], from[1] + share * along[1]];
+    let length = length_squared.sqrt().max(f64::MIN_POSITIVE);
+    let inner_normal = [-along[1] / length, along[0] / length];
+    NearestOnEdge { distance: distance(point, nearest), point: nearest, inner_normal }
+}
+
+pub(crate) fn minus(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
+    [a[0] - b[0], a[1] - b[1]]
+}
+
+pub(crate) fn dot(a: [f64; 2], b: [f64; 2]) -> f64 {
+    a[0] * b[0] + a[1] * b[1]
+}
+
+pub(crate) fn cross(a: [f64; 2], b: [f64; 2]) -> f64 {
+    a[0] * b[1] - a[1] * b[0]
+}
+
+pub(crate) fn distance(a: [f64; 2], b: [f64; 2]) -> f64 {
+    (a[0] - b[0]).hypot(a[1] - b[1])
+}
+
+pub(crate) fn bounding_box(points: &[[f64; 2]]) -> [[f64; 2]; 2] {
+    points.iter().fold([[f64::INFINITY; 2], [f64::NEG_INFINITY; 2]], |[low, high], p| {
+        [[low[0].min(p[0]), low[1].min(p[1])], [high[0].max(p[0]), high[1].max(p[1])]]
+    })
+}
+
+/// Whether a point lies inside a closed polygon (even–odd rule).
+pub(crate) fn ring_contains(points: &[[f64; 2]], [x, y]: [f64; 2]) -> bool {
+    let crosses = |[a, b]: &[[f64; 2]; 2]| {
+        (a[1] > y) != (b[1] > y) && {
+            let side = cross(minus(*b, *a), minus([x, y], *a));
+            (side > 0.0) == (b[1] > a[1])
+        }
+    };
+    sides(points).filter(crosses).count() % 2 == 1
+}
+
+/// Two sides of a closed polygon that cross or touch, neighbours in their common corner excepted.
+pub(crate) fn meeting_sides(points: &[[f64; 2]]) -> Option<(usize, usize)> {
+    let all: Vec<_> = sides(points).collect();
+    let [low, high] = bounding_box(points);
+    let tolerance = MERGE_TOLERANCE * distance(low, high);
+    for (i, &a) in all.iter().enumerate() {
+        if distance(a[0], a[1]) <= tolerance {
+            return Some((i, i));
+        }
+        for (j, &b) in all.iter().enumerate().skip(i + 1) {
+            let meets = match (j == i + 1, i == 0 && j + 1 == all.len()) {
+                (true, _) => folds_back(a, b[1], tolerance),
+                (_, true) => folds_back(b, a[1], tolerance),
+                _ => sides_touch(a, b, tolerance),
+            };
+            if meets {
+                return Some((i, j));
+            }
+        }
+    }
+    None
+}
+
+/// Whether the side after `side`, which ends at `next`, runs back over it.
+fn folds_back(side: [[f64; 2]; 2], next: [f64; 2], tolerance: f64) -> bool {
+    let ahead = [side[1], next];
+    nearest_on_side(side, next).distance <= tolerance || nearest_on_side(ahead, side[0]).distance <= tolerance
+}
+
+/// Whether a segment crosses or touches a closed polygon.
+pub(crate) fn touches_ring(side: [[f64; 2]; 2], ring: &[[f64; 2]]) -> bool {
+    let [low, high] = bounding_box(ring);
+    sides(ring).any(|other| sides_touch(side, other, MERGE_TOLERANCE * distance(low, high)))
+}
+
+fn sides_touch(a: [[f64; 2]; 2], b: [[f64; 2]; 2], tolerance: f64) -> bool {
+    let [a_low, a_high] = bounding_box(&a);
+    let [b_low, b_high] = bounding_box(&b);
+    if (0..2).any(|i| a_low[i] > b_high[i] + tolerance || b_low[i] > a_high[i] + tolerance) {
+        return false;
+    }
+    let side_of = |s: [[f64; 2]; 2], p| cross(minus(s[1], s[0]), minus(p, s[0]));
+    let crosses = side_of(a, b[0]) * side_of(a, b[1]) < 0.0 && side_of(b, a[0]) * side_of(b, a[1]) < 0.0;
+    let near = |s, p| nearest_on_side(s, p).distance <= tolerance;
+    crosses || near(a, b[0]) || near(a, b[1]) || near(b, a[0]) || near(b, a[1])
+}

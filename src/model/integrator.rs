@@ -16,7 +16,7 @@ use super::health::{Counters, Health};
 use super::schedule::{MotionSchedule, RightHandSide};
 use super::stopwatch::Stopwatch;
 use super::tissue::{Configuration, Tissue};
-use crate::numerics::locate::{BorderRule, Walk, WalkEnd, WalkError, WalkRules, nowhere, walk};
+use crate::numerics::walk::{BorderRule, Walk, WalkEnd, WalkError, WalkRules, nowhere, walk};
 use crate::numerics::runge_kutta::{ButcherTableau, EULER, HEUN, RK4};
 use crate::numerics::turning::{kick, perpendicular_part, rotate_in_plane, turn};
 use bevy_ecs::prelude::{Local, QueryState, Resource, With, World};

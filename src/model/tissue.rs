@@ -2,7 +2,8 @@
 
 use super::components::Site;
 use crate::numerics::locate::SeedGrid;
-use crate::numerics::planar_domain::{PlanarDomain, nearest_on_side, sides};
+use crate::numerics::planar_domain::PlanarDomain;
+use crate::numerics::polygon::{nearest_on_side, sides};
 use crate::numerics::simplex_mesh::{BorderFacet, SimplexMesh};
 use bevy_ecs::prelude::Resource;
 use nalgebra::{Matrix2, Vector2, Vector3};

@@ -42,20 +42,20 @@ impl<'a, const D: usize> Element<'a, D> {
         Self { corners: mesh.cell(cell), gradients, volume }
     }
 
-    /// Entry `(i, j)` of the mass matrix over V.
-    fn mass(mass: Mass, i: usize, j: usize) -> f64 {
+    /// Entry `(i, j)` of the consistent mass matrix over V.
+    fn consistent_mass(i: usize, j: usize) -> f64 {
         let d = D as f64;
-        match (mass, i == j) {
-            (Mass::Lumped, true) => 1.0 / (d + 1.0),
-            (Mass::Lumped, false) => 0.0,
-            (Mass::Consistent, true) => 2.0 / ((d + 1.0) * (d + 2.0)),
-            (Mass::Consistent, false) => 1.0 / ((d + 1.0) * (d + 2.0)),
-        }
+        if i == j { 2.0 / ((d + 1.0) * (d + 2.0)) } else { 1.0 / ((d + 1.0) * (d + 2.0)) }
     }
 
-    fn matrix(&self, law: &ReactionDiffusion, i: usize, j: usize) -> f64 {
+    /// Entry `(i, j)` of what couples vertices: diffusion, and decay if its mass is consistent.
+    fn coupling(&self, law: &ReactionDiffusion, i: usize, j: usize) -> f64 {
         let stiffness = law.diffusion * dot(&self.gradients[i], &self.gradients[j]);
-        self.volume * (stiffness + law.degradation * Self::mass(law.mass, i, j))
+        let decay = match law.mass {
+            Mass::Lumped => 0.0,
+            Mass::Consistent => law.degradation * Self::consistent_mass(i, j),
+        };
+        self.volume * (stiffness + decay)
     }
 
     /// `∇w` of a nodal velocity: row k, column l holds ∂w_k/∂x_l.
@@ -69,8 +69,8 @@ impl<'a, const D: usize> Element<'a, D> {
         gradient
     }
 
-    /// Subtracts `K' c` of the cell from `rate`.
-    pub(crate) fn subtract_matrix_rate(
+    /// Subtracts the cell's share of `K' c` from `rate`: that of [`Self::coupling`].
+    pub(crate) fn subtract_coupling_rate(
         &self,
         law: &ReactionDiffusion,
         velocity: &[[f64; D]],
@@ -87,28 +87,78 @@ impl<'a, const D: usize> Element<'a, D> {
             let strained: f64 = (0..D).map(|l| (w[k][l] + w[l][k]) * slope[l]).sum();
             law.diffusion * (divergence * slope[k] - strained)
         });
+        let consistent = f64::from(u8::from(law.mass == Mass::Consistent));
         for (i, &vertex) in self.corners.iter().enumerate() {
-            let decay: f64 =
-                self.corners.iter().enumerate().map(|(j, &v)| Self::mass(law.mass, i, j) * field[v as usize]).sum();
+            let at = |(j, &v): (usize, &u32)| Self::consistent_mass(i, j) * field[v as usize];
+            let decay: f64 = consistent * self.corners.iter().enumerate().map(at).sum::<f64>();
             let change = dot(&self.gradients[i], &flux) + law.degradation * divergence * decay;
             rate[vertex as usize] -= self.volume * change;
         }
     }
 }
 
+/// The connectivities of a system in one configuration.
+#[derive(Clone, Copy)]
+pub(crate) struct Connectivities<'a, const D: usize> {
+    /// Carries diffusion (and consistent decay): flipped where the original is not Delaunay.
+    pub(crate) coupling: &'a SimplexMesh<D>,
+    /// Carries sources and lumped decay, so that these do not jump where an edge flips.
+    pub(crate) original: &'a SimplexMesh<D>,
+}
+
 /// The matrix K of a mesh in one configuration.
 pub(crate) fn assemble<const D: usize>(
     law: &ReactionDiffusion,
-    mesh: &SimplexMesh<D>,
+    meshes: Connectivities<D>,
     coordinates: &[[f64; D]],
     pattern: &Arc<SymmetricPattern>,
 ) -> SymmetricMatrix {
     let mut matrix = SymmetricMatrix::zero(pattern);
-    for cell in 0..mesh.cell_count() {
-        let element = Element::new(mesh, coordinates, cell);
-        matrix.add_element(cell, |i, j| element.matrix(law, i, j));
+    for cell in 0..meshes.coupling.cell_count() {
+        let element = Element::new(meshes.coupling, coordinates, cell);
+        matrix.add_element(cell, |i, j| element.coupling(law, i, j));
+    }
+    if law.mass == Mass::Lumped {
+        let mut decay = vec![0.0; meshes.original.vertex_count()];
+        add_lumped(meshes.original, coordinates, &mut decay, |element| law.degradation * element.volume);
+        matrix.add_diagonal(&decay);
     }
     matrix
+}
+
+/// Subtracts `K' c` from `rate` while the vertices move at `velocity`.
+pub(crate) fn subtract_matrix_rate<const D: usize>(
+    law: &ReactionDiffusion,
+    meshes: Connectivities<D>,
+    (coordinates, velocity): (&[[f64; D]], &[[f64; D]]),
+    field: &[f64],
+    rate: &mut [f64],
+) {
+    for cell in 0..meshes.coupling.cell_count() {
+        let element = Element::new(meshes.coupling, coordinates, cell);
+        element.subtract_coupling_rate(law, velocity, field, rate);
+    }
+    if law.mass == Mass::Lumped {
+        let mut change = vec![0.0; field.len()];
+        add_lumped(meshes.original, coordinates, &mut change, |element| {
+            law.degradation * element.volume * divergence(&element.velocity_gradient(velocity))
+        });
+        (0..field.len()).for_each(|i| rate[i] -= change[i] * field[i]);
+    }
+}
+
+/// Adds an amount of each cell to its corners in equal parts.
+fn add_lumped<const D: usize>(
+    mesh: &SimplexMesh<D>,
+    coordinates: &[[f64; D]],
+    sum: &mut [f64],
+    amount: impl Fn(&Element<D>) -> f64,
+) {
+    for cell in 0..mesh.cell_count() {
+        let element = Element::new(mesh, coordinates, cell);
+        let part = amount(&element) / (D + 1) as f64;
+        element.corners.iter().for_each(|&vertex| sum[vertex as usize] += part);
+    }
 }
 
 /// div w, the trace of ∇w.

@@ -1,12 +1,12 @@
 //! The mathematics: meshes, finite elements, turning law. Knows no ECS, no JSON, no files.
 
 pub mod arrangement;
-pub mod cue_element;
+mod cue_element;
 pub mod delaunay;
 pub mod hermite;
 pub mod hyperelasticity;
 pub mod imposed_motion;
-pub mod lattice;
+mod lattice;
 pub mod load_path;
 pub mod locate;
 pub mod material;
@@ -21,5 +21,5 @@ pub mod simplex_mesh;
 pub mod sparse;
 pub mod triangulate;
 pub mod turning;
-pub mod vector;
+mod vector;
 pub mod walk;

@@ -15,13 +15,13 @@
 //! ```
 //!
 //! In the plane, where the stretched mesh is no longer Delaunay the system is set up on the flipped connectivity
-//! (same vertices, see [`crate::numerics::delaunay`]), so that lumped solutions stay non-negative. The diffusion matrix is
-//! continuous through a flip, the lumped mass and loads only to the mesh's order.
+//! (same vertices, see [`crate::numerics::delaunay`]), so that lumped solutions stay non-negative. Lumped decay and sources stay
+//! on the original connectivity: the stiffness matrix is continuous through a flip, and so is then the field.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use crate::numerics::cue_element::{Element, assemble, divergence};
+use crate::numerics::cue_element::{Connectivities, Element, assemble, divergence, subtract_matrix_rate};
 pub use crate::numerics::cue_element::{Mass, ReactionDiffusion};
 use crate::numerics::delaunay::{EdgeReport, Triangles, region_labels};
 use crate::numerics::simplex_mesh::{MeshError, SimplexMesh};
@@ -196,8 +196,8 @@ impl<'m, const D: usize> StationarySolver<'m, D> {
             Some((mesh, pattern)) => (Some(mesh), pattern),
             None => (None, Arc::clone(&self.pattern)),
         };
-        let mesh = flipped.as_deref().unwrap_or(self.mesh);
-        let factor = assemble(law, mesh, coordinates, &pattern).cholesky()?;
+        let meshes = Connectivities { coupling: flipped.as_deref().unwrap_or(self.mesh), original: self.mesh };
+        let factor = assemble(law, meshes, coordinates, &pattern).cholesky()?;
         self.factorisations += 1;
         let solves = Arc::clone(&self.solves);
         Ok(StationarySystem { law: *law, original: self.mesh, flipped, coordinates, factor, solves })
@@ -269,6 +269,10 @@ impl<const D: usize> StationarySystem<'_, D> {
         self.flipped.as_deref().unwrap_or(self.original)
     }
 
+    fn meshes(&self) -> Connectivities<'_, D> {
+        Connectivities { coupling: self.mesh(), original: self.original }
+    }
+
     /// Whether edges had to be flipped.
     pub fn is_flipped(&self) -> bool {
         self.flipped.is_some()
@@ -331,11 +335,7 @@ impl<const D: usize> StationarySystem<'_, D> {
             let share = density * element.volume / (D + 1) as f64;
             element.corners.iter().for_each(|&vertex| rate[vertex as usize] += share);
         })?;
-        let mesh = self.mesh();
-        for cell in 0..mesh.cell_count() {
-            let element = Element::new(mesh, self.coordinates, cell);
-            element.subtract_matrix_rate(&self.law, velocity, &field, &mut rate);
-        }
+        subtract_matrix_rate(&self.law, self.meshes(), (self.coordinates, velocity), &field, &mut rate);
         let rate = self.solve_load(rate)?;
         Ok((field, rate))
     }
@@ -346,7 +346,7 @@ impl<const D: usize> StationarySystem<'_, D> {
     /// Those of [`Self::load`]; a field of the wrong length.
     pub fn budget(&self, field: &[f64], sources: &[Source]) -> Result<Budget, ReactionDiffusionError> {
         check_length("the field", field.len(), self.original)?;
-        let mesh = self.mesh();
+        let mesh = if self.law.mass == Mass::Lumped { self.original } else { self.mesh() };
         let content: f64 = (0..mesh.cell_count())
             .map(|cell| {
                 let sum: f64 = mesh.cell(cell).iter().map(|&v| field[v as usize]).sum();
@@ -363,7 +363,7 @@ impl<const D: usize> StationarySystem<'_, D> {
         sources: &[Source],
         mut visit: impl FnMut(&Element<D>, &Source),
     ) -> Result<(), ReactionDiffusionError> {
-        let mesh = self.mesh();
+        let mesh = self.original;
         for (source_index, source) in sources.iter().enumerate() {
             for &cell in source.cells {
                 if cell as usize >= mesh.cell_count() {

@@ -157,6 +157,13 @@ impl SymmetricMatrix {
         }
     }
 
+    /// Adds to the diagonal, one entry a row.
+    pub fn add_diagonal(&mut self, diagonal: &[f64]) {
+        for (&start, value) in self.pattern.column_start.iter().zip(diagonal) {
+            self.values[start as usize] += value;
+        }
+    }
+
     /// `y = A x`, both of length `unknowns`.
     pub fn multiply(&self, x: &[f64]) -> Vec<f64> {
         let mut y = vec![0.0; x.len()];

@@ -1,3 +1,4 @@
 //! How axons find their way.
 
 pub mod numerics;
+pub mod record;

@@ -1,0 +1,35 @@
+//! Results out: measures over axons, statistics over seeds, figures and tables.
+//!
+//! Everything here takes plain data (polylines, nodal values, lists) and gives plain data back, so that a run, a replay
+//! of stored trajectories and a test use the same code. Lengths are in µm, times in h, concentrations in nM.
+//!
+//! | question | file |
+//! |---|---|
+//! | Did the axons arrive, how straight, how far turned? | [`measures`] |
+//! | How dispersed and how bundled are they at a height? | [`fascicles`] |
+//! | What is the mean over seeds, and how sure is it? | [`statistics`] |
+//! | How does it look? | [`scene_figure`] → [`png`] |
+//! | Where are the numbers? | [`csv`], written by [`output`] |
+
+pub mod colour;
+pub mod csv;
+mod cue_scale;
+pub mod fascicles;
+pub mod manifest;
+mod markers;
+pub mod measures;
+pub mod output;
+pub mod png;
+pub mod polyline;
+pub mod raster;
+pub mod recorder;
+pub mod scene_figure;
+mod scene_layout;
+mod scene_legend;
+mod scene_panel;
+pub mod scene_view;
+pub mod snapshot;
+pub mod statistics;
+pub mod summary;
+pub mod svg;
+pub mod theme;

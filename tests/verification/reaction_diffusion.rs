@@ -212,7 +212,10 @@ fn a_stretch_breaks_delaunay_and_with_it_positivity_but_flips_mend_both() {
         let negative = unmended.solve(&sources).unwrap().into_iter().fold(f64::INFINITY, f64::min);
         assert!(system.is_flipped() && !unmended.is_flipped());
         assert!(unmended_report.not_delaunay > 50 && negative < 0.0);
-        assert!(report.not_delaunay <= 4 && budget.minimum >= 0.0);
+        // Obtuse angles that face the border remain: no flip can mend them, and the maximum principle is not assured. What is
+        // left of a negative c is far below anything a cone can sense (q/k is 1 here).
+        assert!(report.not_delaunay <= 4 && budget.minimum > -1e-30, "{report:?} {budget:?}");
+        assert!(negative < -1e-5, "{negative}");
     }
 }
 

@@ -3,10 +3,10 @@
 //! Exit codes: 0 done; 1 a fault while solving, running or writing; 2 a bad scenario or bad arguments.
 
 use crate::model::mechanism::Roster;
+use crate::record::manifest::Manifest;
 use crate::scenario::load::{Loaded, Request};
 use crate::study::run::{RunError, folder_of, read, simulate, write_figure, write_json, write_results};
 use crate::study::seeds::{over_seeds, summarise};
-use crate::record::manifest::Manifest;
 use clap::Parser;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::ffi::OsString;
@@ -94,7 +94,14 @@ fn run_once(cli: &Cli, roster: &Roster, loaded: &Loaded, folder: &std::path::Pat
     let (counts, hits) = (&summary.counts, &summary.morphology.hits);
     println!(
         "{}: t = {} h; {} axons: {} arrived, {} growing, {} stalled, {} left, {} unborn",
-        summary.scene, summary.time, counts.axons, counts.arrived, counts.growing, counts.stalled, counts.left, counts.unborn
+        summary.scene,
+        summary.time,
+        counts.axons,
+        counts.arrived,
+        counts.growing,
+        counts.stalled,
+        counts.left,
+        counts.unborn
     );
     if let Some(fraction) = hits.fraction {
         println!("hit fraction {fraction:.3}");

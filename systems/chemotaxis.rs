@@ -164,7 +164,8 @@ impl Availability {
         wrong.demand(table.is_empty() || (self.onset.is_none() && self.offset.is_none()), at, || {
             "give either a table or an onset and offset".into()
         });
-        wrong.demand(table.windows(2).all(|w| w[0][0] < w[1][0]), &format!("{at}/table"), || "times must ascend".into());
+        wrong
+            .demand(table.windows(2).all(|w| w[0][0] < w[1][0]), &format!("{at}/table"), || "times must ascend".into());
         wrong.demand(table.iter().all(|pair| (0.0..=1.0).contains(&pair[1])), &format!("{at}/table"), || {
             "an availability lies in [0, 1]".into()
         });
@@ -175,7 +176,9 @@ impl Availability {
         if !self.table.is_empty() {
             return interpolate(&self.table, time);
         }
-        let rise = |from: f64| if self.width.0 > 0.0 { logistic((time - from) / self.width.0) } else { f64::from(time >= from) };
+        let rise = |from: f64| {
+            if self.width.0 > 0.0 { logistic((time - from) / self.width.0) } else { f64::from(time >= from) }
+        };
         self.onset.map_or(1.0, |t| rise(t.0)) * self.offset.map_or(1.0, |t| 1.0 - rise(t.0))
     }
 }

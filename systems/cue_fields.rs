@@ -324,12 +324,15 @@ impl<'a> CueProblem<'a> {
         }
         if !report.met {
             let (levels, defect) = (path.levels().len(), report.worst_defect);
-            health.note(format!("cue `{name}`: {levels} load levels were not enough; gradients are within {defect:.1e}"));
+            health
+                .note(format!("cue `{name}`: {levels} load levels were not enough; gradients are within {defect:.1e}"));
         }
         let nodes = path.levels().iter().flat_map(|level| level.value.iter().step_by(STRIDE));
         let lowest = nodes.fold(0.0f64, |lowest, c| lowest.min(*c));
         if lowest < 0.0 {
-            health.note(format!("cue `{name}`: the discrete concentration falls to {lowest:.2e} nM; zero is sensed there"));
+            health.note(format!(
+                "cue `{name}`: the discrete concentration falls to {lowest:.2e} nM; zero is sensed there"
+            ));
         }
     }
 }

@@ -145,8 +145,12 @@ impl Mechanism for Matrix {
         let prescribed = self.prescribed(tissue)?;
         let body = Body::new(&tissue.mesh, self.law()?, prescribed).map_err(solve_error)?;
         let options = LoadPathOptions { tolerance: self.tolerance.0, ..LoadPathOptions::default() };
-        let path = LoadPath::solve(&body, &options)
-            .map_err(|error| InstallError::Solve(format!("the matrix (eq. 3) has no path to its full load: {error}{}", remedy(self.material))))?;
+        let path = LoadPath::solve(&body, &options).map_err(|error| {
+            InstallError::Solve(format!(
+                "the matrix (eq. 3) has no path to its full load: {error}{}",
+                remedy(self.material)
+            ))
+        })?;
         let duration = model.world.resource::<Clock>().grid.hours(model.world.resource::<Clock>().end);
         record(model.world, &path);
         model.insert(Loading { path, curve: self.load.clone(), duration }).insert_law(self);
@@ -162,10 +166,15 @@ fn record(world: &mut World, path: &LoadPath) {
     counters.newton_iterations += report.newton_iterations as u64;
     let mut health = world.resource_mut::<Health>();
     if !report.met {
-        health.note(format!("matrix: {} load levels were not enough; the path is within {:.1e}", report.levels, report.defect));
+        health.note(format!(
+            "matrix: {} load levels were not enough; the path is within {:.1e}",
+            report.levels, report.defect
+        ));
     }
     if let Some(load) = report.unstable_from {
-        health.note(format!("matrix: from load {load:.3} on the equilibrium is not stable (negative eigenvalue of the tangent)"));
+        health.note(format!(
+            "matrix: from load {load:.3} on the equilibrium is not stable (negative eigenvalue of the tangent)"
+        ));
     }
     world.resource_mut::<Configuration>().moves = true;
 }

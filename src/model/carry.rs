@@ -21,12 +21,7 @@ pub fn carry(
 }
 
 /// Ours, `heading_follows: spin`: the rotation R of F = R U turns headings as it turns shafts.
-pub fn spin_headings(
-    growth: Res<Growth>,
-    tissue: Res<Tissue>,
-    configuration: Res<Configuration>,
-    mut cones: Cones,
-) {
+pub fn spin_headings(growth: Res<Growth>, tissue: Res<Tissue>, configuration: Res<Configuration>, mut cones: Cones) {
     if growth.heading_spins {
         cones.for_each(|cone, spring| spring.spin.z += configuration.rotation_rate(&tissue.mesh, cone.site.cell));
     }

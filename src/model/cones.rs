@@ -83,14 +83,7 @@ pub struct ConesWith<'w, 's, C: Component<Mutability = bevy_ecs::component::Muta
     query: Query<
         'w,
         's,
-        (
-            &'static GrowthCone,
-            &'static Status,
-            &'static Site,
-            &'static Position,
-            &'static SpringState,
-            &'static mut C,
-        ),
+        (&'static GrowthCone, &'static Status, &'static Site, &'static Position, &'static SpringState, &'static mut C),
         With<GrowthCone>,
     >,
 }

@@ -16,9 +16,9 @@ use super::health::{Counters, Health};
 use super::schedule::{MotionSchedule, RightHandSide};
 use super::stopwatch::Stopwatch;
 use super::tissue::{Configuration, Tissue};
-use crate::numerics::walk::{BorderRule, Walk, WalkEnd, WalkError, WalkRules, nowhere, walk};
 use crate::numerics::runge_kutta::{ButcherTableau, EULER, HEUN, RK4};
 use crate::numerics::turning::{kick, perpendicular_part, rotate_in_plane, turn};
+use crate::numerics::walk::{BorderRule, Walk, WalkEnd, WalkError, WalkRules, nowhere, walk};
 use bevy_ecs::prelude::{Local, QueryState, Resource, With, World};
 use nalgebra::{Rotation3, Vector3};
 use rayon::prelude::*;
@@ -192,7 +192,8 @@ fn enter_stage(step: &Step, mover: &mut Mover, tableau: &ButcherTableau, stage: 
     *mover.site = from;
     set_vector(spring, vector);
     spring.clear();
-    match walk(&step.tissue.mesh, step.tissue.mesh.vertices(), from.planar(), flat(shift), &nowhere(BorderRule::Slide)) {
+    match walk(&step.tissue.mesh, step.tissue.mesh.vertices(), from.planar(), flat(shift), &nowhere(BorderRule::Slide))
+    {
         Ok(walked) => *mover.site = walked.point.into(),
         Err(fault) => mover.start.fault = Some(fault),
     }
@@ -296,14 +297,7 @@ impl Step<'_> {
     }
 
     /// Moves a cone for good: `displacement` in the configuration `coordinates`, with `length` µm grown on the way.
-    fn travel(
-        &self,
-        mover: &mut Mover,
-        from: Site,
-        coordinates: &[[f64; 2]],
-        displacement: Vector3<f64>,
-        length: f64,
-    ) {
+    fn travel(&self, mover: &mut Mover, from: Site, coordinates: &[[f64; 2]], displacement: Vector3<f64>, length: f64) {
         let border = match self.growth.on_border {
             OnBorder::Slide => BorderRule::Slide,
             OnBorder::Stall | OnBorder::Leave => BorderRule::Stop,

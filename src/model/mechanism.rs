@@ -4,10 +4,10 @@
 //! *rates*: pulls, speed factors, heading diffusion, spin. It never moves a cone and never sees Δt, so that the method
 //! stays a choice of the scenario. A mechanism that is absent costs nothing: it is not installed.
 
+use super::components::GrowthCone;
 use super::health::Health;
 use super::random::Stream;
 use super::schedule::{Motion, Phase, Schedules, Slot, Term};
-use super::components::GrowthCone;
 use super::violation::{Violation, Violations};
 use bevy_ecs::prelude::{Component, IntoScheduleConfigs, Resource, World};
 use bevy_ecs::schedule::SystemSet;
@@ -151,11 +151,7 @@ impl<'a> ModelBuilder<'a> {
     }
 
     /// Runs a system in a term of the right-hand side, after those of the mechanisms before it in the roster.
-    pub fn term<Marker>(
-        &mut self,
-        term: Term,
-        system: impl IntoScheduleConfigs<ScheduleSystem, Marker>,
-    ) -> &mut Self {
+    pub fn term<Marker>(&mut self, term: Term, system: impl IntoScheduleConfigs<ScheduleSystem, Marker>) -> &mut Self {
         let slot = Slot::Term(term, self.slot);
         let schedule = &mut self.schedules.right_hand_side;
         schedule.configure_sets(after(slot, (0..self.slot).map(|s| Slot::Term(term, s))).in_set(term));

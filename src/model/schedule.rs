@@ -89,9 +89,7 @@ impl Schedules {
     /// Empty schedules with the phases and terms in their order.
     pub fn new() -> Self {
         let mut step = strict(StepLabel);
-        step.configure_sets(
-            (Phase::Birth, Phase::Neighbours, Phase::Advance, Phase::Settle, Phase::Remodel).chain(),
-        );
+        step.configure_sets((Phase::Birth, Phase::Neighbours, Phase::Advance, Phase::Settle, Phase::Remodel).chain());
         for (phase, next, name) in [
             (Phase::Birth, Some(Phase::Neighbours), "birth"),
             (Phase::Neighbours, Some(Phase::Advance), "neighbours"),
@@ -107,8 +105,7 @@ impl Schedules {
         }
         let mut right_hand_side = strict(StageLabel);
         right_hand_side.configure_sets(
-            (Term::Fields, Term::Release, Term::Weigh, Term::Sample, Term::Carry, Term::Contact, Term::Turn)
-                .chain(),
+            (Term::Fields, Term::Release, Term::Weigh, Term::Sample, Term::Carry, Term::Contact, Term::Turn).chain(),
         );
         for (term, next, name) in [
             (Term::Fields, Some(Term::Release), "cue fields"),

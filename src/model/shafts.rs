@@ -66,8 +66,7 @@ pub struct Shafts {
 impl Shafts {
     /// `count` shafts without a point. `tolerance` and `longest` in µm.
     pub fn new(count: usize, tolerance: f64, longest: f64) -> Self {
-        let empty =
-            Chain { first: NONE, last: NONE, tip: Site::default(), tip_time: 0.0, end: OpenEnd::default() };
+        let empty = Chain { first: NONE, last: NONE, tip: Site::default(), tip_time: 0.0, end: OpenEnd::default() };
         Self {
             tolerance,
             longest,

@@ -32,8 +32,7 @@ impl Recorder {
         let mut figures: Vec<u64> = options.figure_times.iter().map(|t| grid.nearest(*t).min(end)).collect();
         figures.sort_unstable();
         figures.dedup();
-        let columns =
-            [("time", "h"), ("axon", ""), ("status", ""), ("x", "um"), ("y", "um"), ("heading", "deg")];
+        let columns = [("time", "h"), ("axon", ""), ("status", ""), ("x", "um"), ("y", "um"), ("heading", "deg")];
         Self {
             interval: options.trajectory_interval.map(|interval| grid.nearest(interval).max(1)),
             next_point: 0,

@@ -11,7 +11,8 @@ use crate::model::observables::Effect;
 /// # Errors
 /// No snapshot, or data that are not finite.
 pub fn scene_svg(title: &str, subtitle: &str, snapshots: &[Snapshot]) -> Result<String, FigureError> {
-    let panels = snapshots.iter().map(|snapshot| panel(format!("t = {} h", rounded(snapshot.time)), snapshot)).collect();
+    let panels =
+        snapshots.iter().map(|snapshot| panel(format!("t = {} h", rounded(snapshot.time)), snapshot)).collect();
     to_svg(&SceneFigure::new(title, subtitle, panels))
 }
 

@@ -76,7 +76,8 @@ impl Snapshot {
 pub fn shafts(world: &World) -> Vec<Vec<[f64; 2]>> {
     let (tissue, configuration) = (world.resource::<Tissue>(), world.resource::<Configuration>());
     let shafts = world.resource::<Shafts>();
-    let place = |point: crate::numerics::locate::MaterialPoint<2>| point.position(&tissue.mesh, &configuration.coordinates);
+    let place =
+        |point: crate::numerics::locate::MaterialPoint<2>| point.position(&tissue.mesh, &configuration.coordinates);
     (0..shafts.count())
         .map(|shaft| shafts.polyline(shaft).into_iter().map(place).collect::<Vec<_>>())
         .filter(|line| !line.is_empty())
@@ -86,8 +87,7 @@ pub fn shafts(world: &World) -> Vec<Vec<[f64; 2]>> {
 /// Tips of all axons born, in the order of the cones.
 pub fn tips(world: &World) -> Vec<TipView> {
     let (tissue, configuration) = (world.resource::<Tissue>(), world.resource::<Configuration>());
-    let Some(mut cones) =
-        world.try_query_filtered::<(&GrowthCone, &Status, &Site, &SpringState), With<GrowthCone>>()
+    let Some(mut cones) = world.try_query_filtered::<(&GrowthCone, &Status, &Site, &SpringState), With<GrowthCone>>()
     else {
         return Vec::new();
     };

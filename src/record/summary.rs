@@ -122,8 +122,7 @@ impl Summary {
     pub fn of(world: &World, options: &SummaryOptions, fault: Option<&Fault>) -> Self {
         let clock = world.resource::<Clock>();
         let (y_min, y_max) = extent_in_y(world.resource::<Configuration>());
-        let measures =
-            MeasureOptions { shares: options.heights.clone(), y_min, y_max, linkage: options.linkage };
+        let measures = MeasureOptions { shares: options.heights.clone(), y_min, y_max, linkage: options.linkage };
         Self {
             scene: options.scene.clone(),
             seed: options.seed,

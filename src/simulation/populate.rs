@@ -69,8 +69,7 @@ pub(super) fn births_in_order(world: &mut World) -> Vec<u64> {
 fn spawn(world: &mut World, axon: Axon, origin: Origin, speed: f64) -> Entity {
     world.spawn(axon);
     let birth_time = world.resource::<Clock>().grid.hours(axon.birth);
-    let identity =
-        GrowthCone { axon: axon.number, population: axon.population, speed, birth: axon.birth, birth_time };
+    let identity = GrowthCone { axon: axon.number, population: axon.population, speed, birth: axon.birth, birth_time };
     let state = (
         identity,
         origin,

@@ -73,9 +73,7 @@ pub fn simulate(
     mut tick: impl FnMut(f64),
 ) -> Result<Finished, RunError> {
     let mut simulation = Simulation::assemble(loaded, roster).map_err(|error| match error {
-        AssemblyError::Scenario(problems) => {
-            RunError::Scenario(ScenarioErrors { path: path.to_owned(), problems })
-        }
+        AssemblyError::Scenario(problems) => RunError::Scenario(ScenarioErrors { path: path.to_owned(), problems }),
         AssemblyError::Solve(account) => RunError::Solve(account),
     })?;
     let clock = *simulation.world().resource::<Clock>();

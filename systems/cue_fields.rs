@@ -64,7 +64,8 @@ keys! {
 #[serde(transparent)]
 pub struct Cues(pub BTreeMap<String, Cue>);
 
-/// Largest error of the interpolated gradients between load levels, relative, in the mean over the vertices.
+/// Largest error of the interpolated gradients between load levels: relative, root mean square over the vertices. Ours; well
+/// below the error of the gradients themselves.
 const LEVEL_TOLERANCE: f64 = 1e-3;
 /// Cap on the load levels of a cue.
 const MOST_LEVELS: usize = 65;
@@ -256,16 +257,18 @@ impl<'a> CueProblem<'a> {
         loading: Option<&Loading>,
     ) -> Result<(HermitePath, RefinementReport), CueError> {
         let goal = Refinement { tolerance: LEVEL_TOLERANCE, max_levels: MOST_LEVELS };
+        let decay_length = (self.equation.diffusion / self.equation.degradation).sqrt();
+        let defect = |interpolated: &[f64], exact: &[f64]| gradient_defect(interpolated, exact, decay_length);
         let rest = self.mesh.vertices();
         let Some(loading) = loading else {
             let still = vec![[0.0; 2]; rest.len()];
-            return refine(&[0.0], |load, _| self.level(solver, load, rest, &still), gradient_defect, goal);
+            return refine(&[0.0], |load, _| self.level(solver, load, rest, &still), defect, goal);
         };
         let evaluate = |load: f64, _: Option<&[f64]>| {
             let (moved, slope) = loading.configuration(rest, load);
             self.level(solver, load, &moved, &slope)
         };
-        refine(&[0.0, 0.5, 1.0], evaluate, gradient_defect, goal)
+        refine(&[0.0, 0.5, 1.0], evaluate, defect, goal)
     }
 
     /// c and recovered ∇c at every vertex, interleaved, with their derivatives along a motion of the vertices.
@@ -337,13 +340,14 @@ impl<'a> CueProblem<'a> {
     }
 }
 
-/// Root mean square over the vertices of the gradient's relative error.
-fn gradient_defect(interpolated: &[f64], exact: &[f64]) -> f64 {
+/// Root mean square over the vertices of the gradient's error, relative to |∇c| or to c/ℓ (ℓ = √(D/k)), whichever is larger:
+/// where a gradient vanishes by symmetry its own size says nothing.
+fn gradient_defect(interpolated: &[f64], exact: &[f64], decay_length: f64) -> f64 {
     let (mut sum, mut count) = (0.0, 0.0f64);
     for (a, b) in interpolated.chunks_exact(STRIDE).zip(exact.chunks_exact(STRIDE)) {
-        let size = b[1].hypot(b[2]);
+        let size = b[1].hypot(b[2]).max(b[0] / decay_length);
         if size > 0.0 {
-            sum += ((a[1] - b[1]).hypot(a[2] - b[2]) / size).powi(2).min(1.0);
+            sum += ((a[1] - b[1]).hypot(a[2] - b[2]) / size).powi(2);
             count += 1.0;
         }
     }

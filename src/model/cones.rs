@@ -46,15 +46,6 @@ impl Cones<'_, '_> {
     /// Calls `act` for every growing cone, in parallel; returns how many there were. `act` reads the cone and writes its
     /// own spring state, so the result does not depend on the number of threads.
     pub fn for_each(&mut self, act: impl Fn(Cone, &mut SpringState) + Sync) -> u64 {
-        self.for_each_init(|| (), |(), cone, spring| act(cone, spring))
-    }
-
-    /// As [`Self::for_each`], with working memory that `init` makes and tasks reuse; no result may depend on its content.
-    pub fn for_each_init<T>(
-        &mut self,
-        init: impl Fn() -> T + Sync + Send,
-        act: impl Fn(&mut T, Cone, &mut SpringState) + Sync,
-    ) -> u64 {
         let Ok(tables) = self.query.contiguous_iter_mut() else { return 0 };
         let (mut first, mut growing) = (0, 0);
         for (identities, statuses, sites, positions, receptors, mut springs) in tables {
@@ -65,15 +56,32 @@ impl Cones<'_, '_> {
                 .with_min_len(CHUNK)
                 .enumerate()
                 .filter(|(_, (_, status, ..))| **status == Status::Growing)
-                .map_init(&init, |memory, (i, (identity, _, site, position, receptors, spring))| {
+                .map(|(i, (identity, _, site, position, receptors, spring))| {
                     let index = first + i;
-                    let cone = Cone { index, identity, site: *site, position: position.0, receptors: &receptors.0 };
-                    act(memory, cone, spring);
+                    act(Cone { index, identity, site: *site, position: position.0, receptors: &receptors.0 }, spring);
                 })
                 .count() as u64;
             first += count;
         }
         growing
+    }
+
+    /// What `look` sees of each growing cone, in their order.
+    pub fn collect<T>(&self, look: impl Fn(Cone, &SpringState) -> T) -> Vec<T> {
+        let cones = self.query.iter().enumerate().filter(|(_, (_, status, ..))| **status == Status::Growing);
+        cones
+            .map(|(index, (identity, _, site, position, receptors, spring))| {
+                look(Cone { index, identity, site: *site, position: position.0, receptors: &receptors.0 }, spring)
+            })
+            .collect()
+    }
+
+    /// Adds `pulls`, one a growing cone in the order of [`Self::collect`], times `weight`.
+    pub fn add_pulls(&mut self, pulls: &[Vector3<f64>], weight: f64) {
+        let growing = self.query.iter_mut().filter(|(_, status, ..)| **status == Status::Growing);
+        for ((.., mut spring), pull) in growing.zip(pulls) {
+            spring.pull += pull * weight;
+        }
     }
 }
 

@@ -31,7 +31,7 @@ const WHERE: u64 = 1;
 /// Largest distance between a stored shaft and the true path (µm). Ours.
 const SHAFT_TOLERANCE: f64 = 0.25;
 /// Longest stored shaft segment (µm). Ours.
-const LONGEST_SEGMENT: f64 = 8.0;
+const LONGEST_SEGMENT: f64 = 12.0;
 
 /// Spawns axons and growth cones; returns the cones in order.
 pub(super) fn spawn_cones(world: &mut World, scene: &Scene) -> Result<Vec<Entity>, AssemblyError> {

@@ -6,8 +6,9 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use bevy_ecs::prelude::{With, World};
 use serde_json::Value;
-use tropism::model::health::Counters;
+use tropism::model::clock::Clock;
 use tropism::prelude::{GrowthCone, Journey, Position, Roster, SpringState, Status, Vector3};
+use tropism::record::recorder::{Recorder, RecorderOptions};
 use tropism::scenario::load::{Loaded, Request, ScenarioErrors};
 use tropism::simulation::Simulation;
 use tropism::study::run::{Finished, read, simulate};
@@ -73,8 +74,21 @@ pub fn recorded(loaded: &Loaded, roster: &Roster) -> Finished {
     simulate(loaded, roster, "scene.json".as_ref(), true, |_| {}).unwrap_or_else(|error| panic!("{error}"))
 }
 
-pub fn counters(simulation: &Simulation) -> Counters {
-    simulation.counters()
+/// Runs a loaded scene to its end once, and gives its trajectories as written and its end state.
+pub fn observed(loaded: &Loaded, roster: &Roster) -> (String, Simulation) {
+    let mut simulation = Simulation::assemble(loaded, roster).unwrap_or_else(|error| panic!("{error}"));
+    let clock = *simulation.world().resource::<Clock>();
+    let interval = Some(loaded.scene.output.trajectory_interval.0);
+    let options = RecorderOptions { trajectory_interval: interval, figure_times: Vec::new() };
+    let mut recorder = Recorder::new(&options, &clock.grid, clock.end);
+    loop {
+        simulation.bring_tissue_here();
+        recorder.observe(simulation.world()).unwrap();
+        if simulation.is_over() {
+            return (recorder.trajectories.as_str().to_owned(), simulation);
+        }
+        simulation.step().unwrap_or_else(|fault| panic!("{fault}"));
+    }
 }
 
 /// A growth cone after a run.

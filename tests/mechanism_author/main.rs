@@ -129,3 +129,20 @@ fn a_program_of_its_own_is_one_call() {
         "an unknown block is refused"
     );
 }
+
+#[test]
+fn a_pull_that_is_not_finite_ends_the_run_with_one_and_keeps_what_there_is() {
+    let folder = Folder::new();
+    let mut scene = field_alone("rotation", 120.0, 0.0, 0.1);
+    scene["galvanotaxis"] = json!({ "field": 1e308, "weight": 4 });
+    let path = folder.write("scene.json", &scene.to_string());
+    let out = folder.0.join("out");
+    let arguments = ["galvanotaxis".as_ref(), path.as_os_str(), "--out".as_ref(), out.as_os_str()];
+    let code = format!("{:?}", tropism::run(arguments, roster()));
+    assert_eq!(code, format!("{:?}", std::process::ExitCode::from(1)));
+    let summary: Value = serde_json::from_str(&std::fs::read_to_string(out.join("summary.json")).unwrap()).unwrap();
+    assert_eq!(summary["complete"], json!(false));
+    let fault = summary["fault"].as_str().unwrap();
+    assert!(fault.starts_with("at t = ") && fault.contains("finite"), "{fault}");
+    assert!(out.join("trajectories.csv").exists() && out.join("figure.png").exists());
+}

@@ -104,7 +104,7 @@ fn the_exact_field_of_this_test_is_that_of_the_reference() {
             let at = [at[0], at[1]];
             let discs: Vec<Disc> = discs
                 .iter()
-                .map(|d| numbers(d))
+                .map(numbers)
                 .map(|d| Disc { centre: [d[0], d[1]], radius: d[2], inverse_decay_length: 10.0 })
                 .collect();
             if discs.iter().any(|d| (at[0] - d.centre[0]).hypot(at[1] - d.centre[1]) <= d.radius) {

@@ -12,7 +12,7 @@ use tropism::systems;
 fn scene(count: u64, duration: f64, fasciculation: bool) -> Value {
     let mut scene = json!({
         "seed": 11,
-        "tissue": { "outline": { "rectangle": { "width": 400, "height": 300 } }, "mesh_size": 20 },
+        "tissue": { "outline": { "rectangle": { "width": 400, "height": 300 } }, "mesh_size": 40 },
         "time": { "duration": duration, "step": "3 min" },
         "populations": { "axons": { "count": count, "births": { "uniform": { "from": 0, "to": 1 } } } },
         "targets": { "bulb": { "disc": { "centre": [200, 240], "radius": 40 } } },

@@ -261,42 +261,48 @@ impl<'a> CueProblem<'a> {
         let defect = |interpolated: &[f64], exact: &[f64]| gradient_defect(interpolated, exact, decay_length);
         let rest = self.mesh.vertices();
         let Some(loading) = loading else {
-            let still = vec![[0.0; 2]; rest.len()];
-            return refine(&[0.0], |load, _| self.level(solver, load, rest, &still), defect, goal);
+            return refine(&[0.0], |load, _| self.level(solver, load, rest, None), defect, goal);
         };
         let evaluate = |load: f64, _: Option<&[f64]>| {
             let (moved, slope) = loading.configuration(rest, load);
-            self.level(solver, load, &moved, &slope)
+            self.level(solver, load, &moved, Some(&slope))
         };
         refine(&[0.0, 0.5, 1.0], evaluate, defect, goal)
     }
 
-    /// c and recovered ∇c at every vertex, interleaved, with their derivatives along a motion of the vertices.
+    /// c and recovered ∇c at every vertex, interleaved, with their derivatives along a motion of the vertices, if they move.
     fn level(
         &mut self,
         solver: &mut StationarySolver<2>,
         load: f64,
         at: &[[f64; 2]],
-        motion: &[[f64; 2]],
+        motion: Option<&[[f64; 2]]>,
     ) -> Result<ValueAndSlope, CueError> {
         let system = solver.system(&self.equation, at)?;
         if system.is_flipped() {
             self.flipped_from = Some(self.flipped_from.map_or(load, |first| first.min(load)));
         }
-        let (c, slope) = system.solve_with_rate(motion, &self.sources_at(at, motion))?;
+        let sources = self.sources_at(at, motion);
+        let interleave = |c: &[f64], g: &[[f64; 2]]| c.iter().zip(g).flat_map(|(c, g)| [*c, g[0], g[1]]).collect();
+        let Some(motion) = motion else {
+            let c = system.solve(&sources)?;
+            let values: Vec<f64> = interleave(&c, &self.recovery.recover(at, &c, true));
+            let still = vec![0.0; values.len()];
+            return Ok((values, still));
+        };
+        let (c, slope) = system.solve_with_rate(motion, &sources)?;
         let gradient = self.recovery.recover(at, &c, true);
         let gradient_slope = self.gradient_slope(at, motion, &c, &slope);
-        let interleave = |c: &[f64], g: &[[f64; 2]]| c.iter().zip(g).flat_map(|(c, g)| [*c, g[0], g[1]]).collect();
         Ok((interleave(&c, &gradient), interleave(&slope, &gradient_slope)))
     }
 
-    fn sources_at<'s>(&'s self, at: &[[f64; 2]], motion: &[[f64; 2]]) -> Vec<Source<'s>> {
+    fn sources_at<'s>(&'s self, at: &[[f64; 2]], motion: Option<&[[f64; 2]]>) -> Vec<Source<'s>> {
         let source = |cells: &'s Vec<u32>| match self.release {
             Release::PerArea => Source::new(cells, self.rate),
             Release::Total => {
                 let rest = self.mesh.vertices();
                 let area: f64 = cells.iter().map(|&cell| self.mesh.volume(rest, cell as usize)).sum();
-                Source::of_total(self.mesh, at, Some(motion), (cells, self.rate * area))
+                Source::of_total(self.mesh, at, motion, (cells, self.rate * area))
             }
         };
         self.sources.iter().map(source).collect()

@@ -1,0 +1,100 @@
+//! The same seed gives the same bits: again, on other numbers of threads, alone or among seeds.
+
+mod common;
+
+use common::{Fnv, hash_of_states, loaded, observed, recorded};
+use serde_json::{Value, json};
+use tropism::scenario::load::Loaded;
+use tropism::study::seeds::over_seeds;
+use tropism::systems;
+
+/// Everything at once, with more cones than one task handles.
+fn scene(count: u64, duration: f64, fasciculation: bool) -> Value {
+    let mut scene = json!({
+        "seed": 11,
+        "tissue": { "outline": { "rectangle": { "width": 400, "height": 300 } }, "mesh_size": 40 },
+        "time": { "duration": duration, "step": "3 min" },
+        "populations": { "axons": { "count": count, "births": { "uniform": { "from": 0, "to": 1 } } } },
+        "targets": { "bulb": { "disc": { "centre": [200, 240], "radius": 40 } } },
+        "matrix": {},
+        "cues": {
+            "attractant": { "sources": [{ "disc": { "centre": [200, 240], "radius": 40 } }] },
+            "repellent": { "diffusion": "2.5 um^2/s", "sources": [{ "disc": { "centre": [50, 50], "radius": 20 } }] }
+        },
+        "chemotaxis": { "receptors": { "attractant": {}, "repellent": { "effect": "repel" } } },
+        "borders": {}, "heading_noise": {}
+    });
+    if fasciculation {
+        scene["fasciculation"] = json!({});
+    }
+    scene
+}
+
+/// Hash of the trajectories as written, and of every number of every cone's state at the end.
+fn bits(loaded: &Loaded) -> (u64, u64) {
+    let roster = systems::standard();
+    let (trajectories, simulation) = observed(loaded, &roster);
+    let mut table = Fnv::default();
+    table.bytes(trajectories.as_bytes());
+    (table.0, hash_of_states(simulation.world()))
+}
+
+fn on_threads<T: Send>(threads: usize, work: impl FnOnce() -> T + Send) -> T {
+    rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap().install(work)
+}
+
+#[test]
+fn the_number_of_threads_and_repetition_change_no_bit() {
+    let loaded = loaded(&scene(200, 4.0, false), &systems::standard());
+    let one = on_threads(1, || bits(&loaded));
+    for threads in [1, 2, 3] {
+        assert_eq!(on_threads(threads, || bits(&loaded)), one, "{threads} threads");
+    }
+}
+
+#[test]
+fn contact_between_axons_does_not_depend_on_threads_either() {
+    let loaded = loaded(&scene(130, 2.0, true), &systems::standard());
+    let one = on_threads(1, || bits(&loaded));
+    for threads in [2, 3] {
+        assert_eq!(on_threads(threads, || bits(&loaded)), one, "{threads} threads");
+    }
+}
+
+#[test]
+fn another_seed_gives_other_bits() {
+    let roster = systems::standard();
+    let mut loaded = loaded(&scene(5, 2.0, false), &roster);
+    let first = bits(&loaded);
+    loaded.scene.seed += 1;
+    let second = bits(&loaded);
+    assert!(first.0 != second.0 && first.1 != second.1);
+}
+
+/// The summary without what the clock on the wall says.
+fn results(summary: &tropism::record::summary::Summary) -> Value {
+    let mut value = serde_json::to_value(summary).unwrap();
+    let cost = value["cost"].as_object_mut().unwrap();
+    for key in ["seconds", "share", "peak_memory_mib"] {
+        assert!(cost.remove(key).is_some());
+    }
+    value
+}
+
+#[test]
+fn each_place_of_a_run_over_seeds_is_the_single_run_of_its_seed() {
+    let roster = systems::standard();
+    let loaded = loaded(&scene(20, 3.0, true), &roster);
+    let runs = on_threads(2, || over_seeds(&loaded, &roster, "scene.json".as_ref(), 3, |_| {})).unwrap();
+    assert_eq!(runs.len(), 3);
+    for (place, run) in runs.iter().enumerate() {
+        let mut own = loaded.clone();
+        own.scene.seed += place as u64;
+        let alone = recorded(&own, &roster);
+        assert_eq!(results(&run.summary), results(&alone.summary), "place {place}");
+        if place == 0 {
+            assert_eq!(run.recorder.trajectories.as_str(), alone.recorder.trajectories.as_str());
+        }
+    }
+    assert_ne!(results(&runs[0].summary)["morphology"], results(&runs[1].summary)["morphology"]);
+}

@@ -1,0 +1,148 @@
+//! The how-to of a mechanism as a test: mechanisms from outside the crate, written with the prelude alone, run in a roster of
+//! their author's making, meet the same checks, and leave everything else as it was.
+
+mod combined_signal;
+#[path = "../common/mod.rs"]
+mod common;
+mod disc_field;
+mod galvanotaxis;
+mod trajectories;
+
+use common::{Folder, cones, ended, hash_of_states, try_load};
+use galvanotaxis::Galvanotaxis;
+use serde_json::{Value, json};
+use tropism::prelude::*;
+use tropism::systems;
+
+fn roster() -> Roster {
+    systems::standard().with::<Galvanotaxis>()
+}
+
+fn field_alone(method: &str, heading: f64, direction: f64, step: f64) -> Value {
+    json!({
+        "tissue": { "outline": { "rectangle": { "width": 400, "height": 400 } }, "mesh_size": 40 },
+        "time": { "duration": 6, "step": step, "method": method },
+        "populations": { "axons": {
+            "count": 1, "speed": 20, "births": { "at": 0 },
+            "origin": { "points": [[200, 200]] }, "heading": heading
+        } },
+        "galvanotaxis": { "field": "50 mV/mm", "weight": 1.5, "direction": direction }
+    })
+}
+
+#[test]
+fn the_law_of_the_mechanism_is_the_closed_form_of_a_constant_pull() {
+    let (strength, kappa, time, first): (f64, f64, f64, f64) = (0.75, 0.93, 6.0, 120f64.to_radians());
+    let tip = cones(ended(&field_alone("rotation", 120.0, 0.0, 0.1), &roster()).world())[0];
+    let half = (0.5 * first).tan() * (-kappa * strength * time).exp();
+    assert!((tip.spring.heading.y.atan2(tip.spring.heading.x) - 2.0 * half.atan()).abs() < 1e-13);
+}
+
+#[test]
+fn turning_the_field_and_the_heading_turns_the_path() {
+    let angle = 37.0;
+    for method in ["rotation", "euler", "heun", "rk4"] {
+        let centre = Vector3::new(200.0, 200.0, 0.0);
+        let plain = cones(ended(&field_alone(method, 120.0, 10.0, 0.1), &roster()).world())[0];
+        let turned = cones(ended(&field_alone(method, 120.0 + angle, 10.0 + angle, 0.1), &roster()).world())[0];
+        let rotation = Rotation3::from_axis_angle(&Vector3::z_axis(), f64::to_radians(angle));
+        let (place, heading) = (rotation * (plain.position - centre) + centre, rotation * plain.spring.heading);
+        assert!((turned.position - place).norm() < 1e-11, "{method}: {}", (turned.position - place).norm());
+        assert!((turned.spring.heading - heading).norm() < 1e-13, "{method}");
+        assert!((plain.position - centre).norm() > 50.0, "{method}: the path must be long enough to tell");
+    }
+}
+
+fn full_scene(galvanotaxis: Option<f64>) -> Value {
+    let mut scene = json!({
+        "seed": 3,
+        "tissue": { "outline": { "rectangle": { "width": 200, "height": 150 } }, "mesh_size": 20 },
+        "time": { "duration": 4, "step": "4 min" },
+        "populations": { "axons": { "count": 20, "births": { "uniform": { "from": 0, "to": 1 } } } },
+        "matrix": {},
+        "cues": { "attractant": { "sources": [{ "disc": { "centre": [100, 120], "radius": 20 } }] } },
+        "chemotaxis": { "receptors": { "attractant": {} } },
+        "fasciculation": {}, "borders": {}, "heading_noise": {}
+    });
+    if let Some(weight) = galvanotaxis {
+        scene["galvanotaxis"] = json!({ "weight": weight });
+    }
+    scene
+}
+
+#[test]
+fn a_mechanism_of_no_strength_changes_no_bit_and_neither_does_one_left_out() {
+    let hash = |scene: &Value, roster: &Roster| hash_of_states(ended(scene, roster).world());
+    let without = hash(&full_scene(None), &systems::standard());
+    assert_eq!(hash(&full_scene(None), &roster()), without);
+    assert_eq!(hash(&full_scene(Some(0.0)), &roster()), without);
+    assert_ne!(hash(&full_scene(Some(1.0)), &roster()), without);
+    let left_out = try_load(&full_scene(Some(1.0)), &roster(), &["galvanotaxis"], &[]).unwrap();
+    let mut simulation = tropism::simulation::Simulation::assemble(&left_out, &roster()).unwrap();
+    common::to_end(&mut simulation);
+    assert_eq!(hash_of_states(simulation.world()), without);
+}
+
+#[test]
+fn problems_of_its_keys_stand_in_the_same_message_as_all_others() {
+    let mut scene = full_scene(None);
+    scene["galvanotaxis"] = json!({ "field": "50 mV", "weight": 5, "directoin": 3 });
+    scene["time"]["stepp"] = json!(1);
+    scene["borders"] = json!({ "range": -1 });
+    let problems = try_load(&scene, &roster(), &[], &[]).unwrap_err().problems;
+    let found: Vec<_> = problems.iter().map(|problem| (problem.pointer.as_str(), problem.message.as_str())).collect();
+    for (pointer, words) in [
+        ("/galvanotaxis/field", "electric field"),
+        ("/galvanotaxis/weight", "outside what is possible: 0 ≤ weight ≤ 4"),
+        ("/galvanotaxis/directoin", "did you mean `direction`?"),
+        ("/time/stepp", "did you mean `step`?"),
+        ("/borders/range", "outside what is possible"),
+    ] {
+        assert!(found.iter().any(|(at, message)| *at == pointer && message.contains(words)), "{pointer}: {found:#?}");
+    }
+    assert_eq!(found.len(), 5, "{found:#?}");
+}
+
+#[test]
+fn its_own_check_of_the_scene_is_asked() {
+    let mut scene = full_scene(Some(1.0));
+    scene["time"]["duration"] = json!(2000);
+    let loaded = try_load(&scene, &roster(), &[], &[]).unwrap();
+    let error = tropism::simulation::Simulation::assemble(&loaded, &roster()).err().unwrap().to_string();
+    assert_eq!(error, "/galvanotaxis/weight: no field is held for a thousand hours");
+}
+
+#[test]
+fn a_program_of_its_own_is_one_call() {
+    let folder = Folder::new();
+    let path = folder.write("scene.json", &field_alone("rotation", 120.0, 0.0, 0.1).to_string());
+    let out = folder.0.join("out");
+    let run = |roster: Roster| {
+        let arguments = ["galvanotaxis".as_ref(), path.as_os_str(), "--out".as_ref(), out.as_os_str()];
+        format!("{:?}", tropism::run(arguments, roster))
+    };
+    assert_eq!(run(roster()), format!("{:?}", std::process::ExitCode::from(0)));
+    assert!(out.join("summary.json").exists());
+    assert_eq!(
+        run(systems::standard()),
+        format!("{:?}", std::process::ExitCode::from(2)),
+        "an unknown block is refused"
+    );
+}
+
+#[test]
+fn a_pull_that_is_not_finite_ends_the_run_with_one_and_keeps_what_there_is() {
+    let folder = Folder::new();
+    let mut scene = field_alone("rotation", 120.0, 0.0, 0.1);
+    scene["galvanotaxis"] = json!({ "field": 1e308, "weight": 4 });
+    let path = folder.write("scene.json", &scene.to_string());
+    let out = folder.0.join("out");
+    let arguments = ["galvanotaxis".as_ref(), path.as_os_str(), "--out".as_ref(), out.as_os_str()];
+    let code = format!("{:?}", tropism::run(arguments, roster()));
+    assert_eq!(code, format!("{:?}", std::process::ExitCode::from(1)));
+    let summary: Value = serde_json::from_str(&std::fs::read_to_string(out.join("summary.json")).unwrap()).unwrap();
+    assert_eq!(summary["complete"], json!(false));
+    let fault = summary["fault"].as_str().unwrap();
+    assert!(fault.starts_with("at t = ") && fault.contains("finite"), "{fault}");
+    assert!(out.join("trajectories.csv").exists() && out.join("figure.png").exists());
+}

@@ -1,0 +1,30 @@
+//! A test-only mechanism: the same pull for every growth cone.
+
+use tropism::prelude::*;
+
+keys! {
+    /// L̂ += (x, y).
+    pub struct FixedPull {
+        /// The pull.
+        pub pull: [f64; 2] = [1.0, 0.0],
+    }
+}
+
+impl Mechanism for FixedPull {
+    const NAME: &'static str = "fixed_pull";
+
+    fn install(self, model: &mut ModelBuilder) -> Result<(), InstallError> {
+        model.insert_law(self).term(Term::Turn, steer);
+        Ok(())
+    }
+}
+
+fn steer(law: Res<Law<FixedPull>>, mut cones: Cones) {
+    let pull = Vector3::new(law.pull[0], law.pull[1], 0.0);
+    cones.for_each(|_, spring| spring.pull += pull);
+}
+
+/// The standard roster and the fixed pull.
+pub fn roster() -> Roster {
+    tropism::systems::standard().with::<FixedPull>()
+}

@@ -1,0 +1,10 @@
+//! The laws of the model through the whole program: from a scenario to what its axons did.
+
+mod births;
+mod borders;
+#[path = "../common/mod.rs"]
+mod common;
+mod fixed_pull;
+mod noise;
+mod tissue;
+mod turning;

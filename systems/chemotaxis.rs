@@ -376,7 +376,7 @@ mod tests {
         assert!(pulse.at(-20.0) < 1e-9 && pulse.at(30.0) < 1e-9 && pulse.at(4.0) > 0.7);
         let step = Availability { onset: Some(Time(2.0)), width: Time(0.0), ..Availability::default() };
         assert_eq!((step.at(1.999), step.at(2.0)), (0.0, 1.0));
-        let table = Availability { table: vec![[1.0, 0.2], [3.0, 1.0]], ..Availability::default() };
-        assert_eq!((table.at(0.0), table.at(2.0), table.at(9.0)), (0.2, 0.6, 1.0));
+        let table = Availability { table: vec![[1.0, 0.25], [3.0, 1.0]], ..Availability::default() };
+        assert_eq!((table.at(0.0), table.at(2.0), table.at(9.0)), (0.25, 0.625, 1.0));
     }
 }

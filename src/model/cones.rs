@@ -24,22 +24,20 @@ pub struct Cone<'a> {
     pub receptors: &'a [f64],
 }
 
+/// What a term reads of a cone, and the spring state it writes.
+type TermData = (
+    &'static GrowthCone,
+    &'static Status,
+    &'static Site,
+    &'static Position,
+    &'static ReceptorWeights,
+    &'static mut SpringState,
+);
+
 /// All growth cones, for a term of the right-hand side.
 #[derive(SystemParam)]
 pub struct Cones<'w, 's> {
-    query: Query<
-        'w,
-        's,
-        (
-            &'static GrowthCone,
-            &'static Status,
-            &'static Site,
-            &'static Position,
-            &'static ReceptorWeights,
-            &'static mut SpringState,
-        ),
-        With<GrowthCone>,
-    >,
+    query: Query<'w, 's, TermData, With<GrowthCone>>,
 }
 
 impl Cones<'_, '_> {
@@ -85,15 +83,14 @@ impl Cones<'_, '_> {
     }
 }
 
+/// What a term reads of a cone that writes a component of its own.
+type OwnData<C> =
+    (&'static GrowthCone, &'static Status, &'static Site, &'static Position, &'static SpringState, &'static mut C);
+
 /// All growth cones, for a term that writes a component of its own instead of the spring state.
 #[derive(SystemParam)]
 pub struct ConesWith<'w, 's, C: Component<Mutability = bevy_ecs::component::Mutable>> {
-    query: Query<
-        'w,
-        's,
-        (&'static GrowthCone, &'static Status, &'static Site, &'static Position, &'static SpringState, &'static mut C),
-        With<GrowthCone>,
-    >,
+    query: Query<'w, 's, OwnData<C>, With<GrowthCone>>,
 }
 
 impl<C: Component<Mutability = bevy_ecs::component::Mutable>> ConesWith<'_, '_, C> {

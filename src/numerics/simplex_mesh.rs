@@ -89,7 +89,7 @@ impl<const D: usize> SimplexMesh<D> {
         let mut mesh = Self { vertices, cells, neighbours, border: Vec::new() };
         for cell in 0..mesh.cell_count() {
             let volume = mesh.volume(&mesh.vertices, cell);
-            if !(volume > 0.0) {
+            if volume.is_nan() || volume <= 0.0 {
                 return Err(MeshError::NotPositive { cell, volume });
             }
         }
@@ -295,9 +295,9 @@ mod tests {
         let mut g = [[0.0; 2]; 3];
         let area = triangle.barycentric_gradients(triangle.vertices(), 0, &mut g);
         assert!((area - 0.5 * (2.0 - 0.15)).abs() < 1e-15);
-        for i in 0..3 {
+        for (i, g) in g.iter().enumerate() {
             for (j, x) in triangle.vertices().iter().enumerate() {
-                let value = g[i][0] * (x[0] - 0.3) + g[i][1] * (x[1] - 1.0) + if i == 2 { 1.0 } else { 0.0 };
+                let value = g[0] * (x[0] - 0.3) + g[1] * (x[1] - 1.0) + if i == 2 { 1.0 } else { 0.0 };
                 assert!((value - f64::from(i == j)).abs() < 1e-14);
             }
         }
@@ -307,8 +307,8 @@ mod tests {
         tetrahedron.barycentric_gradients(tetrahedron.vertices(), 0, &mut g);
         let edges = tetrahedron.edge_vectors(tetrahedron.vertices(), 0);
         for i in 0..3 {
-            for j in 0..3 {
-                let dot: f64 = (0..3).map(|k| g[i + 1][k] * edges[j][k]).sum();
+            for (j, edge) in edges.iter().enumerate() {
+                let dot: f64 = (0..3).map(|k| g[i + 1][k] * edge[k]).sum();
                 assert!((dot - f64::from(i == j)).abs() < 1e-14);
             }
         }

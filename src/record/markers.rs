@@ -6,7 +6,10 @@ use super::svg::{Svg, number};
 use super::theme;
 use std::fmt::Write;
 
-/// Draws the markers of tips of one status as a single path.
+/// Width of the rim that sets a marker off from what lies below, px.
+const RIM: &str = "0.6";
+
+/// Draws the markers of tips of one status: all rims, then all bodies, so that no rim hides the body of a neighbour.
 pub(super) fn draw_markers(svg: &mut Svg, status: TipStatus, radius: f64, places: impl Iterator<Item = [f64; 2]>) {
     let data = places.fold(String::new(), |mut data, place| {
         append_marker(&mut data, status, radius, place);
@@ -22,7 +25,8 @@ pub(super) fn draw_markers(svg: &mut Svg, status: TipStatus, radius: f64, places
         TipStatus::Left => theme::LEFT,
     });
     let rim = if status == TipStatus::Left { theme::INK } else { "#ffffff" };
-    svg.element("path", &[("d", &data), ("fill", &fill), ("stroke", rim), ("stroke-width", "0.3")]);
+    svg.element("path", &[("d", &data), ("fill", "none"), ("stroke", rim), ("stroke-width", RIM)]);
+    svg.element("path", &[("d", &data), ("fill", &fill)]);
 }
 
 /// Growing: a disc; arrived: a diamond; stalled: a square; left: a triangle.

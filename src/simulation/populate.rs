@@ -1,7 +1,7 @@
 //! Axons and growth cones: who is born where, when, heading which way.
 //!
 //! Every draw is keyed by (seed, axon), so that axon i has the same birth whatever else is in the scene. Axons are numbered
-//! through the populations in the scenario's order; their births are drawn within the population's interval.
+//! through the populations in the order of their names; their births are drawn within the population's interval.
 
 use super::assemble::AssemblyError;
 use crate::model::births::{BirthQueue, FirstHeading, Origin};

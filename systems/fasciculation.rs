@@ -13,6 +13,7 @@
 //! is of first order in Δt whatever the method.
 
 use super::shaft_index::{Asking, Segment, ShaftIndex, ShaftScene};
+use crate::numerics::contact_integral::{Felt, LANES, SegmentLanes};
 use crate::prelude::*;
 use std::collections::BTreeMap;
 
@@ -102,10 +103,8 @@ pub fn alignment_profile(u: f64) -> f64 {
 /// The constants of the law as a cone needs them.
 #[derive(Debug, Clone, Copy)]
 pub struct ContactLaw {
-    /// Reach R_f (µm).
-    pub reach: f64,
-    /// cos Θ_s.
-    pub cos_sector: f64,
+    /// Reach R_f and sector Θ_s.
+    pub felt: Felt,
     /// w_a.
     pub attraction: f64,
     /// w_t.
@@ -116,10 +115,9 @@ pub struct ContactLaw {
 
 impl From<&Fasciculation> for ContactLaw {
     fn from(law: &Fasciculation) -> Self {
-        let sector = law.sector.radians();
+        let cos_sector = if law.sector.0 >= 180.0 { -2.0 } else { law.sector.radians().cos() };
         Self {
-            reach: law.reach.0,
-            cos_sector: if law.sector.0 >= 180.0 { -2.0 } else { sector.cos() },
+            felt: Felt { reach: law.reach.0, cos_sector },
             attraction: law.attraction.0,
             alignment: law.alignment.0,
             follow_backwards: law.follow_backwards,
@@ -127,93 +125,84 @@ impl From<&Fasciculation> for ContactLaw {
     }
 }
 
-impl ContactLaw {
-    /// The integral of the law over one straight shaft segment, for a cone at `x` (µm) with unit heading `e`; without h,
-    /// dimensionless.
-    ///
-    /// With s from the point nearest to the cone, n the vector from the cone to that point, ρ = √(n² + s²), u = ρ/R_f, both
-    /// terms need only W₀ = ∫(1−u)² ds and W₁ = ∫(1−u)² s ds, since g_a(u) d̂ = 27/4 (1−u)² (n + s t)/R_f.
+/// Segments on their way to be integrated, four at a time, and the pull summed in their order.
+struct Summation<'a> {
+    law: &'a ContactLaw,
+    x: Vector3<f64>,
+    e: Vector3<f64>,
+    lanes: SegmentLanes,
+    nearest: [Vector3<f64>; LANES],
+    tangent: [Vector3<f64>; LANES],
+    adhesion: [f64; LANES],
+    filled: usize,
+    sum: Vector3<f64>,
+}
+
+impl<'a> Summation<'a> {
+    /// For a cone at `x` (µm) with unit heading `e`.
+    fn new(law: &'a ContactLaw, x: Vector3<f64>, e: Vector3<f64>) -> Self {
+        Self {
+            law,
+            x,
+            e,
+            lanes: SegmentLanes::default(),
+            nearest: [Vector3::zeros(); LANES],
+            tangent: [Vector3::zeros(); LANES],
+            adhesion: [0.0; LANES],
+            filled: 0,
+            sum: Vector3::zeros(),
+        }
+    }
+
+    /// Adds a segment; one out of reach adds exactly nothing.
     #[inline]
-    pub fn segment_pull(&self, segment: &Segment, x: Vector3<f64>, e: Vector3<f64>) -> Vector3<f64> {
+    fn add(&mut self, segment: &Segment, adhesion: f64) {
         let t = segment.tangent;
-        let from_cone = segment.start - x;
-        let nearest = -from_cone.dot(&t);
-        let n = from_cone + t * nearest;
-        let (first, last) = (-nearest, segment.length - nearest);
-        let (gap, room) = (n.norm_squared(), self.reach * self.reach - n.norm_squared());
+        let from_cone = segment.start - self.x;
+        let first = from_cone.dot(&t);
+        let n = from_cone - t * first;
+        let (gap, last) = (n.norm_squared(), first + segment.length);
         let outside = first.max(-last).max(0.0);
-        if outside * outside >= room {
-            return Vector3::zeros();
+        if gap + outside * outside >= self.law.felt.reach * self.law.felt.reach {
+            return;
         }
-        let half = room.sqrt();
-        let (low, high) = (first.max(-half), last.min(half));
-        let (along, across) = (t.dot(&e), n.dot(&e));
-        let mut weights = [0.0; 2];
-        if self.cos_sector <= 0.0 && across + along * low >= 0.0 && across + along * high >= 0.0 {
-            weights = self.moments(gap, low, high);
-        } else {
-            let cuts = self.sector_cuts(gap, along, across, (low, high));
-            for piece in cuts.windows(2) {
-                let middle = 0.5 * (piece[0] + piece[1]);
-                let distance = (gap + middle * middle).sqrt();
-                if piece[1] > piece[0] && across + along * middle >= self.cos_sector * distance {
-                    let part = self.moments(gap, piece[0], piece[1]);
-                    weights = [weights[0] + part[0], weights[1] + part[1]];
-                }
-            }
+        let lane = self.filled;
+        self.lanes.gap[lane] = gap;
+        self.lanes.first[lane] = first;
+        self.lanes.last[lane] = last;
+        self.lanes.along[lane] = t.dot(&self.e);
+        self.lanes.across[lane] = n.dot(&self.e);
+        (self.nearest[lane], self.tangent[lane], self.adhesion[lane]) = (n, t, adhesion);
+        self.filled += 1;
+        if self.filled == LANES {
+            self.flush();
         }
-        self.combine(n, t, along, weights)
     }
 
-    /// The pull from W₀ and W₁.
-    fn combine(&self, n: Vector3<f64>, t: Vector3<f64>, along: f64, [w0, w1]: [f64; 2]) -> Vector3<f64> {
-        let direction = match (along > 0.0, along < 0.0 && self.follow_backwards) {
-            (true, _) => 1.0,
-            (false, true) => -1.0,
-            (false, false) => 0.0,
-        };
-        let toward = 6.75 * self.attraction / (self.reach * self.reach);
-        n * (toward * w0) + t * (toward * w1 + self.alignment * direction * w0 / self.reach)
-    }
-
-    /// W₀ and W₁ over low ≤ s ≤ high, with n² = `gap`, in closed form:
-    /// ∫u ds = [sρ + n² asinh(s/|n|)]/(2R), ∫u s ds = ρ³/(3R), u² a polynomial.
-    #[inline]
-    fn moments(&self, gap: f64, low: f64, high: f64) -> [f64; 2] {
-        let r = 1.0 / self.reach;
-        let (rho_low, rho_high) = ((gap + low * low).sqrt(), (gap + high * high).sqrt());
-        // asinh(high/|n|) − asinh(low/|n|) by one logarithm, without cancellation for either sign.
-        let log = if gap < 1e-24 {
-            0.0
-        } else if low >= 0.0 {
-            ((high + rho_high) / (low + rho_low)).ln()
-        } else if high <= 0.0 {
-            ((rho_low - low) / (rho_high - high)).ln()
-        } else {
-            ((high + rho_high) * (rho_low - low) / gap).ln()
-        };
-        let (low2, high2) = (low * low, high * high);
-        let linear = high - low;
-        let w0 = linear - r * (high * rho_high - low * rho_low + gap * log)
-            + r * r * (gap * linear + (high2 * high - low2 * low) / 3.0);
-        let (cube_low, cube_high) = (rho_low * rho_low * rho_low, rho_high * rho_high * rho_high);
-        let w1 = 0.5 * (high2 - low2) - r * (cube_high - cube_low) * (2.0 / 3.0)
-            + r * r * (0.5 * gap * (high2 - low2) + 0.25 * (high2 * high2 - low2 * low2));
-        [w0, w1]
-    }
-
-    /// low, the places between at which the segment crosses the sector's rim, high: (n·e + s t·e)² = cos²Θ_s (n² + s²).
-    /// Roots that belong to the mirrored cone cut for nothing, which does no harm.
-    fn sector_cuts(&self, gap: f64, along: f64, across: f64, (low, high): (f64, f64)) -> [f64; 4] {
-        let c2 = self.cos_sector * self.cos_sector;
-        let (a, b, c) = (along * along - c2, along * across, across * across - c2 * gap);
-        let discriminant = b * b - a * c;
-        if self.cos_sector < -1.0 || discriminant <= 0.0 || a == 0.0 {
-            return [low, high, high, high];
+    fn flush(&mut self) {
+        let [w0, w1] = self.law.felt.moments(&self.lanes);
+        let reach = self.law.felt.reach;
+        let toward = 6.75 * self.law.attraction / (reach * reach);
+        for lane in 0..self.filled {
+            let along = self.lanes.along[lane];
+            let direction = match (along > 0.0, along < 0.0 && self.law.follow_backwards) {
+                (true, _) => 1.0,
+                (false, true) => -1.0,
+                (false, false) => 0.0,
+            };
+            let tangential = toward * w1[lane] + self.law.alignment * direction * w0[lane] / reach;
+            let pull = self.nearest[lane] * (toward * w0[lane]) + self.tangent[lane] * tangential;
+            self.sum += pull * self.adhesion[lane];
         }
-        let root = discriminant.sqrt();
-        let (one, two) = ((-b - root) / a, (-b + root) / a);
-        [low, one.min(two).clamp(low, high), one.max(two).clamp(low, high), high]
+        self.filled = 0;
+    }
+
+    /// The sum over all segments added.
+    fn finish(mut self) -> Vector3<f64> {
+        if self.filled > 0 {
+            self.flush();
+        }
+        self.sum
     }
 }
 
@@ -236,11 +225,11 @@ fn attract(
     });
     counters.neighbour_queries += asking.len() as u64;
     let pulls = index.for_each(&scene, &asking, |cone, segments| {
-        let mut sum = Vector3::zeros();
+        let mut pull = Summation::new(&contact, cone.position, cone.heading);
         for segment in segments.iter().filter(|segment| segment.shaft != cone.index) {
-            let adhesion = table.between(cone.population, axons.0[segment.shaft as usize]);
-            sum += contact.segment_pull(segment, cone.position, cone.heading) * adhesion;
+            pull.add(segment, table.between(cone.population, axons.0[segment.shaft as usize]));
         }
+        let sum = pull.finish();
         sum / sum.norm().max(1.0)
     });
     cones.add_pulls(&pulls, law.weight.0);
@@ -257,8 +246,9 @@ mod tests {
     /// The pull of the segment from `a` to `b`, relative to the cone.
     fn pull(law: &ContactLaw, a: Vector3<f64>, b: Vector3<f64>, e: Vector3<f64>) -> Vector3<f64> {
         let length = (b - a).norm();
-        let segment = Segment { start: a, tangent: (b - a) / length, length, shaft: 0 };
-        law.segment_pull(&segment, Vector3::zeros(), e)
+        let mut pull = Summation::new(law, Vector3::zeros(), e);
+        pull.add(&Segment { start: a, tangent: (b - a) / length, length, shaft: 0 }, 1.0);
+        pull.finish()
     }
 
     /// The integral by brute force: many midpoints, the sector tested point by point.
@@ -268,14 +258,14 @@ mod tests {
         let mut sum = Vector3::zeros();
         for i in 0..n {
             let d = a + (b - a) * ((i as f64 + 0.5) / n as f64);
-            let u = d.norm() / law.reach;
-            if u < 1.0 && d.dot(&e) >= law.cos_sector * d.norm() {
+            let u = d.norm() / law.felt.reach;
+            if u < 1.0 && d.dot(&e) >= law.felt.cos_sector * d.norm() {
                 let sign = if t.dot(&e) > 0.0 { 1.0 } else { 0.0 };
                 sum += d.normalize() * (law.attraction * attraction_profile(u))
                     + t * (law.alignment * alignment_profile(u) * sign);
             }
         }
-        sum * (length / n as f64 / law.reach)
+        sum * (length / n as f64 / law.felt.reach)
     }
 
     #[test]

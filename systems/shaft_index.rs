@@ -20,7 +20,7 @@ type Entry = GeomWithData<[f64; 2], VertexId>;
 type Square = [i32; 2];
 
 /// Side of a square over the reach.
-const SIDE: f64 = 1.0;
+const SIDE: f64 = 1.5;
 /// Room for ‖F⁻¹‖ to grow before lists are made anew.
 const ROOM: f64 = 1.05;
 /// Cones that share one gathering of segments: enough to share the work, few enough to spread it over threads.
@@ -202,9 +202,12 @@ impl ShaftScene<'_> {
             let end = self.end(successor);
             last = Some((successor, end));
             let apart = |k: usize| start[k].max(end[k]) < low[k] || start[k].min(end[k]) > high[k];
+            if apart(0) || apart(1) || apart(2) {
+                continue;
+            }
             let chord = end - start;
             let length = chord.norm();
-            if length > 0.0 && !(apart(0) || apart(1) || apart(2)) {
+            if length > 0.0 {
                 segments.push(Segment { start, tangent: chord / length, length, shaft: self.shafts.owner(vertex) });
             }
         }

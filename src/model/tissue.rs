@@ -95,7 +95,11 @@ impl Configuration {
     /// Spatial position of a site (µm).
     #[inline]
     pub fn position(&self, mesh: &SimplexMesh<2>, site: Site) -> Vector3<f64> {
-        lift(site.planar().position(mesh, &self.coordinates))
+        let corners = mesh.cell(site.cell as usize);
+        let [a, b, c] = [0, 1, 2].map(|i| self.coordinates[corners[i] as usize]);
+        let [second, third, _] = site.weights;
+        let at = |k: usize| (1.0 - second - third) * a[k] + second * b[k] + third * c[k];
+        Vector3::new(at(0), at(1), 0.0)
     }
 
     /// Velocity v_φ of the tissue at a site (µm/h).

@@ -1,6 +1,7 @@
 //! The mathematics: meshes, finite elements, turning law. Knows no ECS, no JSON, no files.
 
 pub mod arrangement;
+pub mod contact_integral;
 mod cue_element;
 pub mod delaunay;
 pub mod hermite;

@@ -29,7 +29,7 @@ const WHEN: u64 = 0;
 const WHERE: u64 = 1;
 
 /// Largest distance between a stored shaft and the true path (µm). Ours.
-const SHAFT_TOLERANCE: f64 = 0.25;
+const SHAFT_TOLERANCE: f64 = 0.5;
 /// Longest stored shaft segment (µm). Ours.
 const LONGEST_SEGMENT: f64 = 12.0;
 

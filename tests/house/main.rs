@@ -32,7 +32,7 @@ const ROOMS: &[Room] = &[
     Room {
         folder: "src/numerics",
         rooms: &["numerics"],
-        packages: &["nalgebra", "faer", "rstar", "rayon", "spade", "thiserror"],
+        packages: &["nalgebra", "faer", "rstar", "rayon", "spade", "thiserror", "wide"],
         rule: "numerics names the standard library, nalgebra, faer, rstar, rayon, spade, thiserror and itself; no ECS, no JSON, no other room",
     },
     Room {

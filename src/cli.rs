@@ -4,6 +4,7 @@
 
 use crate::model::mechanism::Roster;
 use crate::record::manifest::Manifest;
+use crate::record::output::prepare_folder;
 use crate::scenario::load::{Loaded, Request};
 use crate::study::run::{RunError, folder_of, read, simulate, write_figure, write_json, write_results};
 use crate::study::seeds::{over_seeds, summarise};
@@ -77,6 +78,7 @@ fn execute(cli: &Cli, roster: &Roster) -> Result<ExitCode, RunError> {
         eprintln!("hint: {hint}");
     }
     let folder = folder_of(cli.out.as_ref(), &loaded.scene.name);
+    prepare_folder(&folder)?;
     let complete = match cli.seeds {
         None => run_once(cli, roster, &loaded, &folder)?,
         Some(count) => run_seeds(cli, roster, &loaded, &folder, count)?,

@@ -193,6 +193,7 @@ fn solve_demanded(world: &mut World) -> Result<(), InstallError> {
             let mut problem = CueProblem::new(world.resource::<Tissue>(), name, cue, &recovery, &mesh);
             let (path, report) =
                 problem.solve(&mut solver, world.get_resource::<Loading>()).map_err(|error| failed(name, error))?;
+            problem.note_coarse_mesh(&mut world.resource_mut::<Health>(), name);
             problem.note(&mut world.resource_mut::<Health>(), name, &path, report);
             let index = fields.names.len();
             let observable = Observable { name: name.clone(), index, read: read_concentration };
@@ -321,6 +322,19 @@ impl<'a> CueProblem<'a> {
         };
         let (ahead, behind) = (shifted(1.0), shifted(-1.0));
         ahead.iter().zip(&behind).map(|(a, b)| [0, 1].map(|k| (a[k] - b[k]) / (2.0 * step))).collect()
+    }
+
+    /// Warns of a mesh too coarse for the decay length ℓ = √(D/k): longer edges than ℓ/4.
+    fn note_coarse_mesh(&self, health: &mut Health, name: &str) {
+        let decay_length = (self.equation.diffusion / self.equation.degradation).sqrt();
+        let rest = self.mesh.vertices();
+        let areas = (0..self.mesh.cell_count()).map(|cell| self.mesh.volume(rest, cell)).sum::<f64>();
+        let edge = (areas / self.mesh.cell_count() as f64 * 4.0 / 3f64.sqrt()).sqrt();
+        if edge > 0.3 * decay_length {
+            health.note(format!(
+                "cue `{name}`: edges of about {edge:.3} um are long for a decay length of {decay_length:.3} um; a quarter is advised"
+            ));
+        }
     }
 
     fn note(&self, health: &mut Health, name: &str, path: &HermitePath, report: RefinementReport) {

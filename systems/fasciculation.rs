@@ -13,7 +13,7 @@
 //! is of first order in Δt whatever the method.
 
 use super::shaft_index::{Asking, Segment, ShaftIndex, ShaftScene};
-use crate::numerics::contact_integral::{Felt, LANES, SegmentLanes};
+use crate::numerics::contact_integral::{Felt, LANES, SegmentLanes, View};
 use crate::prelude::*;
 use std::collections::BTreeMap;
 
@@ -63,6 +63,14 @@ impl Mechanism for Fasciculation {
             return Ok(());
         }
         let table = AdhesionTable::new(&self.adhesion, populations);
+        let fastest = populations.iter().map(|population| population.speed).fold(0.0, f64::max);
+        let clock = model.world.resource::<Clock>();
+        let (step, bound) = (clock.grid.hours(clock.grid.step_ticks()), self.reach.0 / (5.0 * fastest));
+        if step > bound {
+            let text =
+                format!("fasciculation: a step of {step:.4} h is long for contact; {bound:.4} h or less is advised");
+            model.world.resource_mut::<Health>().note(text);
+        }
         ShaftIndex::install(model, self.reach.0);
         model.insert(table).insert_law(self).term(Term::Contact, attract);
         Ok(())
@@ -125,38 +133,35 @@ impl From<&Fasciculation> for ContactLaw {
     }
 }
 
-/// Segments on their way to be integrated, four at a time, and the pull summed in their order.
-struct Summation<'a> {
-    law: &'a ContactLaw,
-    x: Vector3<f64>,
-    e: Vector3<f64>,
+/// Segments on their way to be integrated, four at a time.
+#[derive(Default)]
+struct Batch {
     lanes: SegmentLanes,
     nearest: [Vector3<f64>; LANES],
     tangent: [Vector3<f64>; LANES],
     adhesion: [f64; LANES],
     filled: usize,
+}
+
+/// The pull on one cone, summed segment by segment; the order of the sum depends only on the segments within reach.
+struct Summation<'a> {
+    law: &'a ContactLaw,
+    x: Vector3<f64>,
+    e: Vector3<f64>,
+    whole: Batch,
+    part: Batch,
     sum: Vector3<f64>,
 }
 
 impl<'a> Summation<'a> {
     /// For a cone at `x` (µm) with unit heading `e`.
     fn new(law: &'a ContactLaw, x: Vector3<f64>, e: Vector3<f64>) -> Self {
-        Self {
-            law,
-            x,
-            e,
-            lanes: SegmentLanes::default(),
-            nearest: [Vector3::zeros(); LANES],
-            tangent: [Vector3::zeros(); LANES],
-            adhesion: [0.0; LANES],
-            filled: 0,
-            sum: Vector3::zeros(),
-        }
+        Self { law, x, e, whole: Batch::default(), part: Batch::default(), sum: Vector3::zeros() }
     }
 
-    /// Adds a segment; one out of reach adds exactly nothing.
+    /// Adds a segment; one out of reach or behind adds exactly nothing. `adhesion` is asked only for one that is felt.
     #[inline]
-    fn add(&mut self, segment: &Segment, adhesion: f64) {
+    fn add(&mut self, segment: &Segment, adhesion: impl FnOnce() -> f64) {
         let t = segment.tangent;
         let from_cone = segment.start - self.x;
         let first = from_cone.dot(&t);
@@ -166,43 +171,57 @@ impl<'a> Summation<'a> {
         if gap + outside * outside >= self.law.felt.reach * self.law.felt.reach {
             return;
         }
-        let lane = self.filled;
-        self.lanes.gap[lane] = gap;
-        self.lanes.first[lane] = first;
-        self.lanes.last[lane] = last;
-        self.lanes.along[lane] = t.dot(&self.e);
-        self.lanes.across[lane] = n.dot(&self.e);
-        (self.nearest[lane], self.tangent[lane], self.adhesion[lane]) = (n, t, adhesion);
-        self.filled += 1;
-        if self.filled == LANES {
-            self.flush();
-        }
-    }
-
-    fn flush(&mut self) {
-        let [w0, w1] = self.law.felt.moments(&self.lanes);
-        let reach = self.law.felt.reach;
-        let toward = 6.75 * self.law.attraction / (reach * reach);
-        for lane in 0..self.filled {
-            let along = self.lanes.along[lane];
-            let direction = match (along > 0.0, along < 0.0 && self.law.follow_backwards) {
-                (true, _) => 1.0,
-                (false, true) => -1.0,
-                (false, false) => 0.0,
+        let (along, across) = (t.dot(&self.e), n.dot(&self.e));
+        let ends = [across + along * first, across + along * last];
+        let view = self.law.felt.view(ends, [gap + first * first, gap + last * last]);
+        let batch = match view {
+            View::Nothing => return,
+            View::Whole => &mut self.whole,
+            View::Part => &mut self.part,
+        };
+        let lane = batch.filled;
+        batch.lanes.gap[lane] = gap;
+        batch.lanes.first[lane] = first;
+        batch.lanes.last[lane] = last;
+        batch.lanes.along[lane] = along;
+        batch.lanes.across[lane] = across;
+        (batch.nearest[lane], batch.tangent[lane], batch.adhesion[lane]) = (n, t, adhesion());
+        batch.filled += 1;
+        if batch.filled == LANES {
+            let moments = match view {
+                View::Whole => self.law.felt.moments_of_whole(&batch.lanes),
+                _ => self.law.felt.moments(&batch.lanes),
             };
-            let tangential = toward * w1[lane] + self.law.alignment * direction * w0[lane] / reach;
-            let pull = self.nearest[lane] * (toward * w0[lane]) + self.tangent[lane] * tangential;
-            self.sum += pull * self.adhesion[lane];
+            self.sum += batch.take(self.law, moments);
         }
-        self.filled = 0;
     }
 
     /// The sum over all segments added.
     fn finish(mut self) -> Vector3<f64> {
-        if self.filled > 0 {
-            self.flush();
+        let whole = self.law.felt.moments_of_whole(&self.whole.lanes);
+        let part = self.law.felt.moments(&self.part.lanes);
+        self.sum + self.whole.take(self.law, whole) + self.part.take(self.law, part)
+    }
+}
+
+impl Batch {
+    /// The pull of the segments in the batch, which is then empty.
+    fn take(&mut self, law: &ContactLaw, [w0, w1]: [[f64; LANES]; 2]) -> Vector3<f64> {
+        let reach = law.felt.reach;
+        let toward = 6.75 * law.attraction / (reach * reach);
+        let mut sum = Vector3::zeros();
+        for lane in 0..std::mem::take(&mut self.filled) {
+            let along = self.lanes.along[lane];
+            let direction = match (along > 0.0, along < 0.0 && law.follow_backwards) {
+                (true, _) => 1.0,
+                (false, true) => -1.0,
+                (false, false) => 0.0,
+            };
+            let tangential = toward * w1[lane] + law.alignment * direction * w0[lane] / reach;
+            let pull = self.nearest[lane] * (toward * w0[lane]) + self.tangent[lane] * tangential;
+            sum += pull * self.adhesion[lane];
         }
-        self.sum
+        sum
     }
 }
 
@@ -227,7 +246,7 @@ fn attract(
     let pulls = index.for_each(&scene, &asking, |cone, segments| {
         let mut pull = Summation::new(&contact, cone.position, cone.heading);
         for segment in segments.iter().filter(|segment| segment.shaft != cone.index) {
-            pull.add(segment, table.between(cone.population, axons.0[segment.shaft as usize]));
+            pull.add(segment, || table.between(cone.population, axons.0[segment.shaft as usize]));
         }
         let sum = pull.finish();
         sum / sum.norm().max(1.0)
@@ -247,7 +266,7 @@ mod tests {
     fn pull(law: &ContactLaw, a: Vector3<f64>, b: Vector3<f64>, e: Vector3<f64>) -> Vector3<f64> {
         let length = (b - a).norm();
         let mut pull = Summation::new(law, Vector3::zeros(), e);
-        pull.add(&Segment { start: a, tangent: (b - a) / length, length, shaft: 0 }, 1.0);
+        pull.add(&Segment { start: a, tangent: (b - a) / length, length, shaft: 0 }, || 1.0);
         pull.finish()
     }
 

@@ -4,9 +4,10 @@
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
+use tropism::model::mechanism::Facts;
 use tropism::prelude::*;
 use tropism::scenario::load::{Loaded, Request, ScenarioErrors, load, read_value};
-use tropism::scenario::schema::{BlockSchema, full_schema};
+use tropism::scenario::schema::{BlockFindings, BlockSchema, full_schema};
 
 quantity! {
     /// A force per length of membrane.
@@ -56,13 +57,17 @@ pub enum Law {
     },
 }
 
-fn check_galvanotaxis(value: &serde_json::Value) -> Result<(), Violations> {
-    let block: Galvanotaxis = read_value("", value)?;
+fn check_galvanotaxis(value: &serde_json::Value, _facts: &Facts) -> BlockFindings {
     let mut violations = Violations::new();
-    violations.demand(block.weight.0 < 9.0 || block.electrodes.is_empty(), "/weight", || {
-        "a weight of 9 or more leaves no room for electrodes".to_owned()
-    });
-    violations.into_result()
+    match read_value::<Galvanotaxis>("", value) {
+        Ok(block) => {
+            violations.demand(block.weight.0 < 9.0 || block.electrodes.is_empty(), "/weight", || {
+                "a weight of 9 or more leaves no room for electrodes".to_owned()
+            });
+        }
+        Err(problem) => violations = problem.into(),
+    }
+    BlockFindings { violations, shapes: Vec::new() }
 }
 
 fn blocks() -> Vec<BlockSchema> {
@@ -224,7 +229,7 @@ fn each_bad_value_gets_its_own_sentence() {
         ),
         (
             r#"{"targets": {"t": {"disc": {"centre": [9000, 0], "radius": 50}}}}"#,
-            "/targets/t: the target lies outside the tissue",
+            "/targets/t: the target lies outside the tissue, or partly so",
         ),
         (
             r#"{"targets": {"t": {"disc": {"centre": [400, 0], "raduis": 50}}}}"#,

@@ -284,11 +284,6 @@ impl Roster {
         self
     }
 
-    /// Name and JSON Schema of each mechanism's block, in order.
-    pub fn schemas(&self) -> Vec<(&'static str, Value)> {
-        self.entries.iter().map(|entry| (entry.name, (entry.schema)())).collect()
-    }
-
     /// Names of the mechanisms, in order.
     pub fn names(&self) -> Vec<&'static str> {
         self.entries.iter().map(|entry| entry.name).collect()

@@ -42,7 +42,19 @@ pub struct Felt {
     pub cos_sector: f64,
 }
 
-/// An interval of s with its ends' ρ.
+/// How much of a segment lies within the sector, as far as its ends tell (both sector and what lies behind it are convex for
+/// Θ ≥ 90°, up to the rim).
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum View {
+    /// All of it.
+    Whole,
+    /// Perhaps a part.
+    Part,
+    /// Nothing: it lies in the cone behind.
+    Nothing,
+}
+
+/// An interval of s.
 #[derive(Clone, Copy)]
 struct Interval {
     low: f64x4,
@@ -57,13 +69,51 @@ struct Parts {
 }
 
 impl Felt {
+    /// Which part of a segment can be felt, from its ends alone: `across + along·s` at each end and ρ² there.
+    #[inline]
+    pub fn view(&self, ends: [f64; 2], squares: [f64; 2]) -> View {
+        if self.cos_sector < -1.0 {
+            return View::Whole;
+        }
+        if self.cos_sector > 0.0 {
+            return View::Part;
+        }
+        let c2 = self.cos_sector * self.cos_sector;
+        let behind = |k: usize| ends[k] < 0.0 && ends[k] * ends[k] >= c2 * squares[k];
+        if ends[0] >= 0.0 && ends[1] >= 0.0 {
+            View::Whole
+        } else if behind(0) && behind(1) {
+            View::Nothing
+        } else {
+            View::Part
+        }
+    }
+
+    /// W₀ (µm) and W₁ (µm²) of four segments that lie within the sector as a whole.
+    #[inline]
+    pub fn moments_of_whole(&self, lanes: &SegmentLanes) -> [[f64; LANES]; 2] {
+        let gap = f64x4::from(lanes.gap);
+        self.finish(gap, &self.parts(gap, self.clipped(gap, lanes)))
+    }
+
+    #[inline]
+    fn clipped(&self, gap: f64x4, lanes: &SegmentLanes) -> Interval {
+        let room = (f64x4::splat(self.reach * self.reach) - gap).fast_max(f64x4::ZERO).sqrt();
+        let low = f64x4::from(lanes.first).fast_max(-room);
+        Interval { low, high: f64x4::from(lanes.last).fast_min(room).fast_max(low) }
+    }
+
+    #[inline]
+    fn finish(&self, gap: f64x4, parts: &Parts) -> [[f64; LANES]; 2] {
+        let w0 = parts.plain - gap * parts.ratio.ln() * (1.0 / self.reach);
+        [w0.to_array(), parts.first_moment.to_array()]
+    }
+
     /// W₀ (µm) and W₁ (µm²) of four segments.
     #[inline]
     pub fn moments(&self, lanes: &SegmentLanes) -> [[f64; LANES]; 2] {
         let gap = f64x4::from(lanes.gap);
-        let room = (f64x4::splat(self.reach * self.reach) - gap).fast_max(f64x4::ZERO).sqrt();
-        let low = f64x4::from(lanes.first).fast_max(-room);
-        let clipped = Interval { low, high: f64x4::from(lanes.last).fast_min(room).fast_max(low) };
+        let clipped = self.clipped(gap, lanes);
         let sign = if self.cos_sector > 0.0 { 1.0 } else { -1.0 };
         let within = || {
             let (along, across) = (f64x4::from(lanes.along) * sign, f64x4::from(lanes.across) * sign);
@@ -75,8 +125,7 @@ impl Felt {
             let all = self.parts(gap, clipped);
             if self.cos_sector < -1.0 { all } else { all.without(&self.parts(gap, within())) }
         };
-        let w0 = parts.plain - gap * parts.ratio.ln() * (1.0 / self.reach);
-        [w0.to_array(), parts.first_moment.to_array()]
+        self.finish(gap, &parts)
     }
 
     #[inline]
@@ -186,6 +235,35 @@ mod tests {
                     let error = (w0[lane] - b0).abs().max((w1[lane] - b1).abs() / 10.0);
                     assert!(error < 2e-4, "cos {cos_sector}, lane {lane}: {} {b0}, {} {b1}", w0[lane], w1[lane]);
                 }
+            }
+        }
+    }
+
+    #[test]
+    fn what_the_ends_tell_agrees_with_the_integral() {
+        let felt = Felt { reach: 10.0, cos_sector: -0.5 };
+        for (first, last, along, across, view) in [
+            (1.0, 5.0, 0.6, 2.0, View::Whole),
+            (-9.0, -6.0, 1.0, 0.0, View::Nothing),
+            (-9.0, 6.0, 1.0, 0.0, View::Part),
+        ] {
+            let ends = [across + along * first, across + along * last];
+            assert_eq!(felt.view(ends, [4.0 + first * first, 4.0 + last * last]), view);
+            let lanes = SegmentLanes {
+                gap: [4.0; LANES],
+                first: [first; LANES],
+                last: [last; LANES],
+                along: [along; LANES],
+                across: [across; LANES],
+            };
+            let found = felt.moments(&lanes);
+            match view {
+                View::Whole => {
+                    let whole = felt.moments_of_whole(&lanes);
+                    assert!((0..2).all(|k| (whole[k][0] - found[k][0]).abs() < 1e-13));
+                }
+                View::Nothing => assert!(found[0][0].abs() < 1e-13 && found[1][0].abs() < 1e-12),
+                View::Part => assert!(found[0][0] > 0.1),
             }
         }
     }

@@ -29,6 +29,16 @@ pub fn write_atomically(path: &Path, contents: &[u8]) -> Result<(), WriteError> 
     })
 }
 
+/// Makes a folder for results and tries to write into it, so that a long run does not end in one that cannot be written.
+///
+/// # Errors
+/// The path and the system's reason.
+pub fn prepare_folder(folder: &Path) -> Result<(), WriteError> {
+    let trial = folder.join(".trial");
+    write_atomically(&trial, b"")?;
+    fs::remove_file(&trial).map_err(|source| WriteError { path: trial, source })
+}
+
 /// `folder/.name.partial` for `folder/name`.
 fn temporary_beside(path: &Path) -> PathBuf {
     let mut name = OsString::from(".");

@@ -4,7 +4,7 @@ use super::measures::{MeasureOptions, Morphology, measure};
 use super::snapshot::{axon_records, extent_in_y, tips};
 use crate::model::clock::Clock;
 use crate::model::components::{GrowthCone, Journey, Status};
-use crate::model::growth::{Growth, Populations};
+use crate::model::growth::{Growth, Populations, Targets};
 use crate::model::health::{Counters, Fault, Health};
 use crate::model::shafts::Shafts;
 use crate::model::stopwatch::Stopwatch;
@@ -130,13 +130,24 @@ impl Summary {
             complete: fault.is_none() && clock.is_over(),
             fault: fault.map(ToString::to_string),
             counts: counts(world),
-            morphology: measure(&axon_records(world), &measures),
+            morphology: morphology(world, &measures),
             speed_drift: speed_drift(world),
             derived: constants(world),
             notes: world.resource::<Health>().notes().to_vec(),
             cost: cost(world),
         }
     }
+}
+
+/// The morphology; without targets there is no hit fraction.
+fn morphology(world: &World, options: &MeasureOptions) -> Morphology {
+    let mut found = measure(&axon_records(world), options);
+    if world.resource::<Targets>().cells.is_empty() {
+        for hits in [&mut found.hits, &mut found.hits_early, &mut found.hits_late] {
+            hits.fraction = None;
+        }
+    }
+    found
 }
 
 fn counts(world: &World) -> Counts {

@@ -52,7 +52,12 @@ impl Scene {
         }
         for (name, target) in self.targets.iter().filter(|_| sound(&["targets"])) {
             let pointer = format!("/targets{}", pointer_token(name));
-            check_target(target, sound(&["tissue"]).then_some(&self.tissue.outline), &pointer, &mut violations);
+            check_region(
+                target,
+                sound(&["tissue"]).then_some(&self.tissue.outline),
+                (&pointer, "the target"),
+                &mut violations,
+            );
         }
         violations.into_result()
     }
@@ -137,12 +142,18 @@ fn check_births(population: &Population, duration: Time, pointer: &str, violatio
         .demand(from < duration, &pointer, || format!("the first birth, at {from}, is not before the end, {duration}"));
 }
 
-fn check_target(target: &Shape, outline: Option<&Outline>, pointer: &str, violations: &mut Violations) {
-    if let Err(found) = target.check() {
-        return violations.extend_under(pointer, found);
+/// Checks that a region is a proper shape and lies inside the tissue; `place` is its pointer and what to call it.
+pub(super) fn check_region(
+    region: &Shape,
+    outline: Option<&Outline>,
+    place: (&str, &str),
+    violations: &mut Violations,
+) {
+    if let Err(found) = region.check() {
+        return violations.extend_under(place.0, found);
     }
-    let reached = outline.is_none_or(|outline| meets(target, outline));
-    violations.demand(reached, pointer, || "the target lies outside the tissue".to_owned());
+    let inside = outline.is_none_or(|outline| lies_inside(region, outline));
+    violations.demand(inside, place.0, || format!("{} lies outside the tissue, or partly so", place.1));
 }
 
 fn is_inside(outline: &Outline, point: [f64; 2]) -> bool {
@@ -154,17 +165,17 @@ fn is_inside(outline: &Outline, point: [f64; 2]) -> bool {
     polygon_contains(&outline.outer().coordinates(), point) && !outline.holes().iter().any(in_hole)
 }
 
-/// Whether a target and the outer border have a point in common, judged by corners and, for a disc, by the distance of the border.
-fn meets(target: &Shape, outline: &Outline) -> bool {
-    let border = outline.outer().coordinates();
-    let covers_corner = border.iter().any(|&corner| target.contains(corner));
-    covers_corner
-        || match target {
-            Shape::Disc { centre, radius } => {
-                let centre = centre.map(|length| length.0);
-                let near = segments(&border).any(|(a, b)| distance_to_segment(centre, a, b) < radius.0);
-                near || polygon_contains(&border, centre)
-            }
-            Shape::Polygon { points } => coordinates(points).iter().any(|&point| polygon_contains(&border, point)),
-        }
+/// Points of a disc's rim that are looked at.
+const RIM: usize = 64;
+
+/// Whether a region lies inside the tissue, judged by the corners of a polygon and by points on the rim of a disc.
+fn lies_inside(region: &Shape, outline: &Outline) -> bool {
+    match region {
+        Shape::Disc { centre, radius } => (0..RIM).all(|i| {
+            let angle = std::f64::consts::TAU * i as f64 / RIM as f64;
+            let reach = radius.0 * (1.0 - 1e-9);
+            is_inside(outline, [centre[0].0 + reach * angle.cos(), centre[1].0 + reach * angle.sin()])
+        }),
+        Shape::Polygon { points } => coordinates(points).iter().all(|&point| is_inside(outline, point)),
+    }
 }

@@ -8,6 +8,7 @@ use serde::de::DeserializeOwned;
 use serde_json::{Map, Value};
 use thiserror::Error;
 
+use super::checks::check_region;
 use super::merge::{idle_removals, merge, strip_nulls};
 use super::overrides;
 use super::read::read_file;
@@ -15,6 +16,7 @@ use super::scene::Scene;
 use super::schema::{BlockSchema, full_schema};
 use super::schema_view::show;
 use super::schema_walk::walk;
+use crate::model::mechanism::Facts;
 use crate::model::violation::{Violation, Violations, pointer_token};
 
 /// A base of a base … at most this many files deep.
@@ -238,14 +240,44 @@ impl Draft {
         let scene = read_value::<Scene>("", &Value::Object(core)).map_err(|problem| self.problems.push(problem)).ok();
         let found = scene.as_ref().and_then(|scene| scene.check_except(&broken).err()).unwrap_or_default();
         self.problems.extend(found);
-        for (check, block) in blocks.iter().filter_map(|block| block.check.map(|check| (check, block))) {
-            if let Some(Err(found)) = mechanisms.get(block.name).map(check) {
-                let mut placed = Violations::new();
-                placed.extend_under(&pointer_token(block.name), found);
-                self.problems.extend(placed);
-            }
+        if let Some(scene) = &scene {
+            self.check_blocks(scene, &mechanisms, blocks, &broken);
         }
         (scene, mechanisms)
+    }
+}
+
+impl Draft {
+    /// Lets each sound block check itself against the scene, as far as the rest of the scene is sound.
+    fn check_blocks(
+        &mut self,
+        scene: &Scene,
+        mechanisms: &Map<String, Value>,
+        blocks: &[BlockSchema],
+        broken: &BTreeSet<String>,
+    ) {
+        let facts = facts(scene, &self.document);
+        let outline = (!broken.contains("tissue")).then_some(&scene.tissue.outline);
+        for block in blocks {
+            let Some((check, value)) = block.check.as_ref().zip(mechanisms.get(block.name)) else { continue };
+            let found = check(value, &facts);
+            let mut placed = Violations::new();
+            placed.extend_under(&pointer_token(block.name), found.violations);
+            for (pointer, shape) in found.shapes {
+                check_region(&shape, outline, (&pointer, "the shape"), &mut placed);
+            }
+            self.problems.extend(placed);
+        }
+    }
+}
+
+/// What a block's check may know of the scene. Names of blocks that are broken still count.
+pub fn facts(scene: &Scene, document: &Value) -> Facts {
+    Facts {
+        populations: scene.populations.keys().cloned().collect(),
+        edges: scene.tissue.outline.edge_names(),
+        blocks: document.as_object().cloned().unwrap_or_default(),
+        duration: scene.time.duration.0,
     }
 }
 

@@ -77,8 +77,6 @@ keys! {
         /// When figures are drawn, as shares of the duration.
         #[schemars(inner(range(min = 0.0, max = 1.0)))]
         pub figure_times: Vec<Factor> = vec![Factor(0.0), Factor(0.5), Factor(1.0)],
-        /// The cue drawn in figures, by name; by default the first.
-        pub figure_cue: Option<String> = None,
         /// Shafts nearer than this belong to one fascicle.
         #[schemars(extend("exclusiveMinimum" = 0.0))]
         pub linkage_distance: Length = Length(10.0),

@@ -3,13 +3,26 @@
 use serde_json::{Map, Value, json};
 
 use super::scene::Scene;
+use crate::model::mechanism::Facts;
+use crate::model::shape::Shape;
 use crate::model::violation::Violations;
+use std::sync::Arc;
 
-/// A check of a block that a schema cannot state, such as a comparison of two keys.
-pub type BlockCheck = fn(&Value) -> Result<(), Violations>;
+/// What a block's own check finds: violations, relative to the block, and shapes that must lie inside the tissue, each with
+/// its place from the top of the scene.
+#[derive(Debug, Clone, Default)]
+pub struct BlockFindings {
+    /// What is wrong.
+    pub violations: Violations,
+    /// What must lie inside the tissue.
+    pub shapes: Vec<(String, Shape)>,
+}
+
+/// A check of a block that a schema cannot state: relations between keys, names that must exist in the scene.
+pub type BlockCheck = Arc<dyn Fn(&Value, &Facts) -> BlockFindings + Send + Sync>;
 
 /// The key of a mechanism, the JSON schema of its block and its own check.
-#[derive(Debug, Clone)]
+#[derive(Clone)]
 pub struct BlockSchema {
     /// The key at the top of a scene.
     pub name: &'static str,
@@ -27,8 +40,8 @@ impl BlockSchema {
 
     /// The block with its own check.
     #[must_use]
-    pub fn checked_by(mut self, check: BlockCheck) -> Self {
-        self.check = Some(check);
+    pub fn checked_by(mut self, check: impl Fn(&Value, &Facts) -> BlockFindings + Send + Sync + 'static) -> Self {
+        self.check = Some(Arc::new(check));
         self
     }
 }

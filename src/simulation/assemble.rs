@@ -4,10 +4,10 @@ use super::{Simulation, populate};
 use crate::model::births::give_birth;
 use crate::model::carry::{carry, spin_headings};
 use crate::model::clock::{Clock, StageTime, TimeGrid};
-use crate::model::growth::{Growth, Method, OnBorder, Targets};
+use crate::model::growth::{Growth, Method, OnBorder, Population, Populations, Targets};
 use crate::model::health::{Counters, Health};
 use crate::model::integrator::{advance, bring_tissue_to};
-use crate::model::mechanism::{Facts, InstallError, Installable, ModelBuilder, Roster};
+use crate::model::mechanism::{InstallError, Installable, ModelBuilder, Roster};
 use crate::model::observables::Observables;
 use crate::model::schedule::{MotionSchedule, Phase, RightHandSide, Schedules, Term};
 use crate::model::settle::settle;
@@ -17,7 +17,8 @@ use crate::model::tissue::{Configuration, Tissue};
 use crate::model::violation::Violation;
 use crate::numerics::planar_domain::{Outline, PlanarDomain, Ring};
 use crate::numerics::triangulate::{MeshOptions, TriangulationError, triangulate};
-use crate::scenario::load::Loaded;
+use crate::numerics::turning::derived;
+use crate::scenario::load::{Loaded, facts};
 use crate::scenario::scene::{self, Scene};
 use bevy_ecs::prelude::{IntoScheduleConfigs, World};
 use std::collections::BTreeMap;
@@ -63,6 +64,7 @@ pub(super) fn assemble(loaded: &Loaded, roster: &Roster) -> Result<Simulation, A
     let mut schedules = Schedules::new();
     install(&mut world, &mut schedules, chosen, scene.seed, &cones)?;
     add_core_systems(&world, &mut schedules);
+    note_fast_springs(&mut world);
     schedules.initialize(&mut world).map_err(AssemblyError::Solve)?;
     world.insert_resource(MotionSchedule(schedules.motion));
     world.insert_resource(RightHandSide(schedules.right_hand_side));
@@ -74,29 +76,21 @@ pub(super) fn assemble(loaded: &Loaded, roster: &Roster) -> Result<Simulation, A
 
 /// Reads the blocks in the roster's order and lets each check itself against the scene.
 fn read_blocks(loaded: &Loaded, roster: &Roster) -> Result<Vec<Chosen>, AssemblyError> {
+    let facts = facts(&loaded.scene, &loaded.merged);
     let mut chosen = Vec::new();
     let mut wrong = Vec::new();
     for (slot, entry) in roster.entries.iter().enumerate() {
         let Some(block) = loaded.blocks.get(entry.name) else { continue };
+        let at = format!("/{}", entry.name);
         match (entry.read)(block) {
-            Ok(law) => chosen.push(Chosen { slot: slot as u32, name: entry.name, law }),
-            Err(message) => wrong.push(Violation::new(format!("/{}", entry.name), message)),
+            Ok(law) => {
+                wrong.extend(law.check(&facts).into_iter().map(|violation| violation.under(&at)));
+                chosen.push(Chosen { slot: slot as u32, name: entry.name, law });
+            }
+            Err(message) => wrong.push(Violation::new(at, message)),
         }
     }
-    let facts = facts(loaded);
-    for Chosen { name, law, .. } in &chosen {
-        wrong.extend(law.check(&facts).into_iter().map(|violation| violation.under(&format!("/{name}"))));
-    }
     if wrong.is_empty() { Ok(chosen) } else { Err(AssemblyError::Scenario(wrong)) }
-}
-
-fn facts(loaded: &Loaded) -> Facts {
-    Facts {
-        populations: loaded.scene.populations.keys().cloned().collect(),
-        edges: loaded.scene.tissue.outline.edge_names(),
-        blocks: loaded.blocks.clone(),
-        duration: loaded.scene.time.duration.0,
-    }
 }
 
 fn clock(scene: &Scene) -> Result<Clock, AssemblyError> {
@@ -209,6 +203,20 @@ fn refused(name: &str, error: InstallError) -> AssemblyError {
     match error {
         InstallError::Scenario(violation) => AssemblyError::Scenario(vec![violation.under(&format!("/{name}"))]),
         InstallError::Solve(account) => AssemblyError::Solve(account),
+    }
+}
+
+/// Eq. (1) is derived for ω δt ≪ 1.
+fn note_fast_springs(world: &mut World) {
+    let growth = *world.resource::<Growth>();
+    for Population { name, speed, .. } in world.resource::<Populations>().0.clone() {
+        let found = derived(growth.turning_rate, growth.filopodium_length, speed, growth.filopodia_time);
+        if found.omega_filopodia_time > 0.3 {
+            let value = found.omega_filopodia_time;
+            let text =
+                format!("population `{name}`: omega dt = {value:.2}; eq. (1) holds for values well below 1 (0.3)");
+            world.resource_mut::<Health>().note(text);
+        }
     }
 }
 

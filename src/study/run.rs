@@ -2,7 +2,8 @@
 
 use crate::model::clock::Clock;
 use crate::model::health::Fault;
-use crate::model::mechanism::Roster;
+use crate::model::mechanism::{Entry, Roster};
+use crate::model::violation::Violation;
 use crate::record::manifest::Manifest;
 use crate::record::output::{WriteError, write_atomically};
 use crate::record::png::{PngError, scale_for_dpi, to_png};
@@ -12,7 +13,7 @@ use crate::record::scene_view::scene_svg;
 use crate::record::snapshot::Snapshot;
 use crate::record::summary::{Summary, SummaryOptions};
 use crate::scenario::load::{Loaded, Request, ScenarioErrors, load};
-use crate::scenario::schema::BlockSchema;
+use crate::scenario::schema::{BlockFindings, BlockSchema};
 use crate::simulation::{AssemblyError, Simulation};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
@@ -56,9 +57,17 @@ pub struct Finished {
 /// # Errors
 /// All problems of the file at once.
 pub fn read(request: &Request, roster: &Roster) -> Result<Loaded, ScenarioErrors> {
-    let schemas = roster.schemas().into_iter();
-    let blocks: Vec<_> = schemas.map(|(name, schema)| BlockSchema::new(name, schema)).collect();
-    load(request, &blocks)
+    let block = |entry: &Entry| {
+        let entry = *entry;
+        BlockSchema::new(entry.name, (entry.schema)()).checked_by(move |value, facts| match (entry.read)(value) {
+            Ok(law) => {
+                let shapes = law.outlines().into_iter().map(|(name, shape)| (format!("/{name}"), shape)).collect();
+                BlockFindings { violations: law.check(facts), shapes }
+            }
+            Err(message) => BlockFindings { violations: Violation::new("", message).into(), shapes: Vec::new() },
+        })
+    };
+    load(request, &roster.entries.iter().map(block).collect::<Vec<_>>())
 }
 
 /// Runs a loaded scene to its end, or to the fault that ends it. `tick` is called after each step with the share done.

@@ -111,10 +111,15 @@ fn leaves(summary: &Summary) -> Result<Vec<(String, f64)>, RunError> {
 }
 
 fn collect(place: &str, value: &Value, found: &mut Vec<(String, f64)>) {
+    // Settings and sample sizes stand among the measures of a run; over seeds they say nothing.
+    const CONSTANTS: [&str; 5] = ["share", "y_um", "linkage_um", "n", "axons"];
     let inside = |key: &str| if place.is_empty() { key.to_owned() } else { format!("{place}.{key}") };
     match value {
         Value::Number(number) => found.extend(number.as_f64().map(|x| (place.to_owned(), x))),
-        Value::Object(keys) => keys.iter().for_each(|(key, value)| collect(&inside(key), value, found)),
+        Value::Object(keys) => {
+            let measures = keys.iter().filter(|(key, _)| !CONSTANTS.contains(&key.as_str()));
+            measures.for_each(|(key, value)| collect(&inside(key), value, found));
+        }
         Value::Array(items) => {
             items.iter().enumerate().for_each(|(i, value)| collect(&inside(&i.to_string()), value, found));
         }

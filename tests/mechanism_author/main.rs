@@ -107,9 +107,11 @@ fn problems_of_its_keys_stand_in_the_same_message_as_all_others() {
 fn its_own_check_of_the_scene_is_asked() {
     let mut scene = full_scene(Some(1.0));
     scene["time"]["duration"] = json!(2000);
-    let loaded = try_load(&scene, &roster(), &[], &[]).unwrap();
-    let error = tropism::simulation::Simulation::assemble(&loaded, &roster()).err().unwrap().to_string();
-    assert_eq!(error, "/galvanotaxis/weight: no field is held for a thousand hours");
+    scene["borders"]["range"] = json!(-1);
+    let errors = try_load(&scene, &roster(), &[], &[]).unwrap_err();
+    let found: Vec<String> = errors.problems.iter().map(ToString::to_string).collect();
+    assert_eq!(found.len(), 2, "beside the problems of others: {found:#?}");
+    assert!(found.contains(&"/galvanotaxis/weight: no field is held for a thousand hours".to_owned()), "{found:#?}");
 }
 
 #[test]

@@ -108,6 +108,10 @@ impl Mechanism for Chemotaxis {
     fn check(&self, facts: &Facts) -> Violations {
         let mut wrong = Violations::new();
         let cues = facts.names_in(Cues::NAME);
+        if cues.is_empty() && !self.receptors.is_empty() {
+            wrong.push("", "the scene has no cues for these receptors; leave `chemotaxis` out as well");
+            return wrong;
+        }
         for (name, receptor) in &self.receptors {
             let at = format!("/receptors/{name}");
             wrong.demand(cues.contains(name), &at, || unknown_name("cue", name, &cues));

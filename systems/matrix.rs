@@ -146,10 +146,7 @@ impl Mechanism for Matrix {
         let body = Body::new(&tissue.mesh, self.law()?, prescribed).map_err(solve_error)?;
         let options = LoadPathOptions { tolerance: self.tolerance.0, ..LoadPathOptions::default() };
         let path = LoadPath::solve(&body, &options).map_err(|error| {
-            InstallError::Solve(format!(
-                "the matrix (eq. 3) has no path to its full load: {error}{}",
-                remedy(self.material)
-            ))
+            InstallError::Solve(format!("the matrix (eq. 3) has no path to its full load: {error}{}", remedy(&self)))
         })?;
         let duration = model.world.resource::<Clock>().grid.hours(model.world.resource::<Clock>().end);
         record(model.world, &path);
@@ -179,8 +176,11 @@ fn record(world: &mut World, path: &LoadPath) {
     world.resource_mut::<Configuration>().moves = true;
 }
 
-fn remedy(material: MaterialLaw) -> &'static str {
-    match material {
+fn remedy(matrix: &Matrix) -> &'static str {
+    if matrix.poisson_ratio.0 > 0.49 {
+        return ". A Poisson ratio this near 0.5 locks linear triangles; 0.45 or less is advised";
+    }
+    match matrix.material {
         MaterialLaw::StVenantKirchhoff => {
             ". St. Venant-Kirchhoff fails in compression; `\"material\": \"neo_hookean\"` goes further, as does less motion"
         }

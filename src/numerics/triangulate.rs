@@ -69,7 +69,9 @@ pub enum TriangulationError {
         point: [f64; 2],
     },
     /// More vertices would be needed than are allowed.
-    #[error("the mesh needs more than {limit} vertices at the size {size} µm")]
+    #[error(
+        "the mesh needs more than {limit} vertices at the size {size} µm; sides that nearly touch may be the cause"
+    )]
     TooManyVertices {
         /// Most vertices allowed.
         limit: usize,
@@ -207,6 +209,7 @@ fn refined_triangles(
     }
     let mut points = constraints.points.clone();
     points.extend(lattice(domain, constraints, options.size));
+    points.extend(frame(domain));
     let settled = |x: f64| if x.abs() < 1e-100 { 0.0 } else { x };
     let points: Vec<_> = points.iter().map(|p| Point2::new(settled(p[0]), settled(p[1]))).collect();
     let count = points.len();
@@ -228,6 +231,20 @@ fn refined_triangles(
     let vertices = cdt.vertices().map(|v| [v.position().x, v.position().y]).collect();
     let triangles = cdt.inner_faces().map(|face| face.vertices().map(|v| v.index() as u32)).collect();
     Ok((vertices, triangles))
+}
+
+/// Corners of a box well outside the domain. Points on a slanted side lie on it only up to round-off, so that they and the convex hull
+/// would enclose triangles without a height, which no refinement mends; with a box around, the hull is the box's. Sides parallel
+/// to an axis are exact and need none.
+fn frame(domain: &PlanarDomain) -> Vec<[f64; 2]> {
+    let slanted = |[a, b]: [[f64; 2]; 2]| a[0] != b[0] && a[1] != b[1];
+    if !domain.rings().flat_map(|ring| sides(&ring.points)).any(slanted) {
+        return Vec::new();
+    }
+    let [low, high] = domain.bounding_box();
+    let room = 0.5 * domain.diameter();
+    let (x, y) = ([low[0] - room, high[0] + room], [low[1] - room, high[1] + room]);
+    vec![[x[0], y[0]], [x[1], y[0]], [x[1], y[1]], [x[0], y[1]]]
 }
 
 /// Drops what is outside, and numbers the rest along a Morton curve.
@@ -321,6 +338,36 @@ mod tests {
 
     fn total_area(fitted: &FittedMesh) -> f64 {
         (0..fitted.mesh.cell_count()).map(|c| fitted.mesh.volume(fitted.mesh.vertices(), c)).sum()
+    }
+
+    #[test]
+    fn slanted_sides_are_meshed_with_as_few_vertices_as_straight_ones() {
+        let corner = |x: f64, y: f64| [x, y];
+        let hexagon = (0..6).map(|i| {
+            let angle = std::f64::consts::PI * (f64::from(i) / 3.0 + 0.1);
+            corner(100.0 + 90.0 * angle.cos(), 100.0 + 90.0 * angle.sin())
+        });
+        let mut polygons = vec![
+            vec![corner(0.0, 0.0), corner(200.0, 0.0), corner(90.0, 140.0)],
+            vec![corner(0.0, 0.0), corner(200.0, 0.0), corner(170.0, 150.0), corner(30.0, 150.0)],
+            hexagon.collect(),
+        ];
+        for x in [170.0, 210.0, 230.0, 240.0, 250.0] {
+            polygons.push(vec![corner(0.0, 0.0), corner(200.0, 0.0), corner(x, 150.0), corner(0.0, 150.0)]);
+        }
+        for points in polygons {
+            for size in [5.0, 15.0, 30.0] {
+                let edges = vec![0; points.len()];
+                let ring = Ring { points: points.clone(), edges };
+                let domain = PlanarDomain::new(ring, Vec::new(), vec!["border".into()]);
+                let fitted = triangulate(&domain, &[], &MeshOptions::of_size(size)).unwrap();
+                assert!((total_area(&fitted) / domain.area() - 1.0).abs() < 1e-12, "{points:?}");
+                let expected = domain.area() / (size * size) * 1.155;
+                let count = fitted.mesh.vertex_count() as f64;
+                assert!(count < 3.0 * expected + 60.0, "{points:?} at {size}: {count} for {expected}");
+                assert!(fitted.min_angle > 25f64.to_radians(), "{points:?}: {}", fitted.min_angle);
+            }
+        }
     }
 
     #[test]

@@ -34,6 +34,10 @@ pub fn write_atomically(path: &Path, contents: &[u8]) -> Result<(), WriteError> 
 /// # Errors
 /// The path and the system's reason.
 pub fn prepare_folder(folder: &Path) -> Result<(), WriteError> {
+    if folder.exists() && !folder.is_dir() {
+        let source = io::Error::new(io::ErrorKind::NotADirectory, "it is a file, not a folder");
+        return Err(WriteError { path: folder.to_owned(), source });
+    }
     let trial = folder.join(".trial");
     write_atomically(&trial, b"")?;
     fs::remove_file(&trial).map_err(|source| WriteError { path: trial, source })

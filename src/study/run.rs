@@ -142,11 +142,14 @@ pub fn write_results(folder: &Path, loaded: &Loaded, finished: &Finished) -> Res
     write_figure(folder, loaded, &finished.recorder.snapshots)
 }
 
-/// Writes `figure.svg` and `figure.png`.
+/// Writes `figure.svg` and `figure.png`; nothing if no time was asked for.
 ///
 /// # Errors
 /// As [`write_results`].
 pub fn write_figure(folder: &Path, loaded: &Loaded, snapshots: &[Snapshot]) -> Result<(), RunError> {
+    if snapshots.is_empty() {
+        return Ok(());
+    }
     let svg = scene_svg(&loaded.scene.name, &loaded.scene.description, snapshots)?;
     write_atomically(&folder.join("figure.svg"), svg.as_bytes())?;
     write_atomically(&folder.join("figure.png"), &to_png(&svg, scale_for_dpi(DPI))?)?;

@@ -162,8 +162,12 @@ impl<'a> Summation<'a> {
     /// Adds a segment; one out of reach or behind adds exactly nothing. `adhesion` is asked only for one that is felt.
     #[inline]
     fn add(&mut self, segment: &Segment, adhesion: impl FnOnce() -> f64) {
-        let t = segment.tangent;
         let from_cone = segment.start - self.x;
+        let farthest = self.law.felt.reach + segment.length;
+        if from_cone.norm_squared() >= farthest * farthest {
+            return;
+        }
+        let t = segment.tangent;
         let first = from_cone.dot(&t);
         let n = from_cone - t * first;
         let (gap, last) = (n.norm_squared(), first + segment.length);

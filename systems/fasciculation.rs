@@ -12,8 +12,9 @@
 //! unless a key allows it. All cones read the shafts of the step's start: the result does not depend on their order, and contact
 //! is of first order in Δt whatever the method.
 
-use super::shaft_index::{Asking, Segment, ShaftIndex, ShaftScene};
-use crate::numerics::contact_integral::{Felt, LANES, SegmentLanes, View};
+use super::shaft_index::{Asking, ShaftIndex, ShaftScene};
+use crate::numerics::contact_integral::Felt;
+use crate::numerics::segments::Sensed;
 use crate::prelude::*;
 use std::collections::BTreeMap;
 
@@ -93,8 +94,10 @@ impl AdhesionTable {
         Self { count: populations.len(), values: values.collect() }
     }
 
-    fn between(&self, row: u16, column: u16) -> f64 {
-        self.values[row as usize * self.count + column as usize]
+    /// What a population feels of each.
+    fn row(&self, population: u16) -> &[f64] {
+        let first = population as usize * self.count;
+        &self.values[first..first + self.count]
     }
 }
 
@@ -133,97 +136,22 @@ impl From<&Fasciculation> for ContactLaw {
     }
 }
 
-/// Segments on their way to be integrated, four at a time.
-#[derive(Default)]
-struct Batch {
-    lanes: SegmentLanes,
-    nearest: [Vector3<f64>; LANES],
-    tangent: [Vector3<f64>; LANES],
-    adhesion: [f64; LANES],
-    filled: usize,
-}
-
-/// The pull on one cone, summed segment by segment; the order of the sum depends only on the segments within reach.
-struct Summation<'a> {
-    law: &'a ContactLaw,
-    x: Vector3<f64>,
-    e: Vector3<f64>,
-    whole: Batch,
-    part: Batch,
-    sum: Vector3<f64>,
-}
-
-impl<'a> Summation<'a> {
-    /// For a cone at `x` (µm) with unit heading `e`.
-    fn new(law: &'a ContactLaw, x: Vector3<f64>, e: Vector3<f64>) -> Self {
-        Self { law, x, e, whole: Batch::default(), part: Batch::default(), sum: Vector3::zeros() }
-    }
-
-    /// Adds a segment; one out of reach or behind adds exactly nothing. `adhesion` is asked only for one that is felt.
+impl ContactLaw {
+    /// The pull of all that was felt, each segment times the adhesion to its shaft; not yet limited to 1.
     #[inline]
-    fn add(&mut self, segment: &Segment, adhesion: impl FnOnce() -> f64) {
-        let from_cone = segment.start - self.x;
-        let farthest = self.law.felt.reach + segment.length;
-        if from_cone.norm_squared() >= farthest * farthest {
-            return;
-        }
-        let t = segment.tangent;
-        let first = from_cone.dot(&t);
-        let n = from_cone - t * first;
-        let (gap, last) = (n.norm_squared(), first + segment.length);
-        let outside = first.max(-last).max(0.0);
-        if gap + outside * outside >= self.law.felt.reach * self.law.felt.reach {
-            return;
-        }
-        let (along, across) = (t.dot(&self.e), n.dot(&self.e));
-        let ends = [across + along * first, across + along * last];
-        let view = self.law.felt.view(ends, [gap + first * first, gap + last * last]);
-        let batch = match view {
-            View::Nothing => return,
-            View::Whole => &mut self.whole,
-            View::Part => &mut self.part,
-        };
-        let lane = batch.filled;
-        batch.lanes.gap[lane] = gap;
-        batch.lanes.first[lane] = first;
-        batch.lanes.last[lane] = last;
-        batch.lanes.along[lane] = along;
-        batch.lanes.across[lane] = across;
-        (batch.nearest[lane], batch.tangent[lane], batch.adhesion[lane]) = (n, t, adhesion());
-        batch.filled += 1;
-        if batch.filled == LANES {
-            let moments = match view {
-                View::Whole => self.law.felt.moments_of_whole(&batch.lanes),
-                _ => self.law.felt.moments(&batch.lanes),
-            };
-            self.sum += batch.take(self.law, moments);
-        }
-    }
-
-    /// The sum over all segments added.
-    fn finish(mut self) -> Vector3<f64> {
-        let whole = self.law.felt.moments_of_whole(&self.whole.lanes);
-        let part = self.law.felt.moments(&self.part.lanes);
-        self.sum + self.whole.take(self.law, whole) + self.part.take(self.law, part)
-    }
-}
-
-impl Batch {
-    /// The pull of the segments in the batch, which is then empty.
-    fn take(&mut self, law: &ContactLaw, [w0, w1]: [[f64; LANES]; 2]) -> Vector3<f64> {
-        let reach = law.felt.reach;
-        let toward = 6.75 * law.attraction / (reach * reach);
-        let mut sum = Vector3::zeros();
-        for lane in 0..std::mem::take(&mut self.filled) {
-            let along = self.lanes.along[lane];
-            let direction = match (along > 0.0, along < 0.0 && law.follow_backwards) {
-                (true, _) => 1.0,
-                (false, true) => -1.0,
-                (false, false) => 0.0,
-            };
-            let tangential = toward * w1[lane] + law.alignment * direction * w0[lane] / reach;
-            let pull = self.nearest[lane] * (toward * w0[lane]) + self.tangent[lane] * tangential;
-            sum += pull * self.adhesion[lane];
+    fn pull<const D: usize>(&self, sensed: &Sensed<D>, adhesion: impl Fn(u32) -> f64) -> [f64; D] {
+        let reach = self.felt.reach;
+        let toward = 6.75 * self.attraction / (reach * reach);
+        let backwards = if self.follow_backwards { -1.0 } else { 0.0 };
+        let direction = |along: f64| if along < 0.0 { backwards } else { f64::from(along > 0.0) };
+        let mut sum = [0.0; D];
+        for touch in sensed.touches() {
+            let [w0, w1] = touch.moments;
+            let tangential = toward * w1 + self.alignment * direction(touch.along) * w0 / reach;
+            let h = adhesion(touch.owner);
+            for k in 0..D {
+                sum[k] += (touch.normal[k] * (toward * w0) + touch.tangent[k] * tangential) * h;
+            }
         }
         sum
     }
@@ -247,12 +175,12 @@ fn attract(
         heading: spring.heading,
     });
     counters.neighbour_queries += asking.len() as u64;
-    let pulls = index.for_each(&scene, &asking, |cone, segments| {
-        let mut pull = Summation::new(&contact, cone.position, cone.heading);
-        for segment in segments.iter().filter(|segment| segment.shaft != cone.index) {
-            pull.add(segment, || table.between(cone.population, axons.0[segment.shaft as usize]));
-        }
-        let sum = pull.finish();
+    let pulls = index.for_each(&scene, &asking, |sensed: &mut Sensed<2>, cone, segments| {
+        let (x, e) = (cone.position.xy().into(), cone.heading.xy().into());
+        sensed.sense(&contact.felt, x, e, segments, cone.index);
+        let row = table.row(cone.population);
+        let [x, y] = contact.pull(sensed, |shaft| row[axons.0[shaft as usize] as usize]);
+        let sum = Vector3::new(x, y, 0.0);
         sum / sum.norm().max(1.0)
     });
     cones.add_pulls(&pulls, law.weight.0);
@@ -261,6 +189,7 @@ fn attract(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::numerics::segments::Segments;
 
     fn law() -> ContactLaw {
         ContactLaw::from(&Fasciculation::default())
@@ -268,10 +197,10 @@ mod tests {
 
     /// The pull of the segment from `a` to `b`, relative to the cone.
     fn pull(law: &ContactLaw, a: Vector3<f64>, b: Vector3<f64>, e: Vector3<f64>) -> Vector3<f64> {
-        let length = (b - a).norm();
-        let mut pull = Summation::new(law, Vector3::zeros(), e);
-        pull.add(&Segment { start: a, tangent: (b - a) / length, length, shaft: 0 }, || 1.0);
-        pull.finish()
+        let (mut segments, mut sensed) = (Segments::default(), Sensed::<3>::default());
+        segments.push(a.into(), b.into(), 0);
+        sensed.sense(&law.felt, [0.0; 3], e.into(), &segments, 1);
+        law.pull(&sensed, |_| 1.0).into()
     }
 
     /// The integral by brute force: many midpoints, the sector tested point by point.

@@ -278,5 +278,4 @@ fn follow_load(
     configuration.coordinates = moved;
     (configuration.load, configuration.load_rate) = (load, rate);
     configuration.revision += 1;
-    configuration.bound_inverse_stretch(&tissue.mesh);
 }

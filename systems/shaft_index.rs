@@ -10,21 +10,46 @@
 //! has gone. Lists hold more than is near and are sorted; what is not within reach adds exactly nothing, so results are those of
 //! looking at every segment of every shaft, to the last bit.
 
+use crate::model::shafts::BLOCK;
+use crate::numerics::locate::MaterialPoint;
+use crate::numerics::segments::Segments;
 use crate::prelude::*;
+use nalgebra::Vector2;
 use rayon::prelude::*;
 use rstar::primitives::GeomWithData;
 use rstar::{AABB, RTree};
 use std::collections::HashMap;
+use std::sync::{Mutex, PoisonError};
 
 type Entry = GeomWithData<[f64; 2], VertexId>;
 type Square = [i32; 2];
 
 /// Side of a square over the reach.
-const SIDE: f64 = 1.5;
+const SIDE: f64 = 3.0;
 /// Room for ‖F⁻¹‖ to grow before lists are made anew.
 const ROOM: f64 = 1.05;
-/// Cones that share one gathering of segments: enough to share the work, few enough to spread it over threads.
-const SHARED: usize = 16;
+/// Cones of a square that one task serves: few enough to spread a crowded square over threads.
+const SHARED: usize = 32;
+
+/// Work memory that tasks take and give back: one for each that runs at the same time.
+struct Pool<T>(Mutex<Vec<T>>);
+
+impl<T> Default for Pool<T> {
+    fn default() -> Self {
+        Self(Mutex::new(Vec::new()))
+    }
+}
+
+impl<T: Default> Pool<T> {
+    fn lend<R>(&self, work: impl FnOnce(&mut T) -> R) -> R {
+        let lock = || self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let taken = lock().pop();
+        let mut memory = taken.unwrap_or_default();
+        let result = work(&mut memory);
+        lock().push(memory);
+        result
+    }
+}
 
 /// A cone that asks for its neighbours.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -41,19 +66,6 @@ pub struct Asking {
     pub heading: Vector3<f64>,
 }
 
-/// A straight piece of a shaft as it lies now.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Segment {
-    /// Its start (µm), nearer to the shaft's origin.
-    pub start: Vector3<f64>,
-    /// Unit tangent, toward the tip.
-    pub tangent: Vector3<f64>,
-    /// Length (µm), positive.
-    pub length: f64,
-    /// The shaft it belongs to.
-    pub shaft: u32,
-}
-
 /// The neighbour index over all shaft segments.
 #[derive(Debug, Resource, Default)]
 pub struct ShaftIndex {
@@ -61,6 +73,52 @@ pub struct ShaftIndex {
     reach: f64,
     radius: f64,
     lists: HashMap<Square, Vec<VertexId>>,
+    places: Places,
+}
+
+/// Positions now of the vertices in blocks that some list names, each found once for all squares.
+#[derive(Debug, Default)]
+struct Places {
+    positions: Vec<[[f64; 2]; BLOCK]>,
+    /// For each block, one more than the revision of the configuration it was found in; 0 when not yet, or no longer complete.
+    revisions: Vec<u64>,
+    stale: Vec<bool>,
+}
+
+impl Places {
+    /// Finds the blocks of all listed vertices, and those that follow them.
+    fn bring_up_to_date<'a>(&mut self, scene: &ShaftScene, listed: impl Iterator<Item = &'a VertexId>) {
+        let (now, blocks) = (scene.configuration.revision + 1, scene.shafts.block_count());
+        self.positions.resize(blocks, [[0.0; 2]; BLOCK]);
+        self.revisions.resize(blocks, 0);
+        self.stale.resize(blocks, false);
+        let mut want = |block: u32| self.stale[block as usize] = self.revisions[block as usize] != now;
+        for &vertex in listed {
+            let block = vertex / BLOCK as u32;
+            want(block);
+            if vertex as usize % BLOCK == BLOCK - 1 {
+                scene.shafts.block_after(block).into_iter().for_each(&mut want);
+            }
+        }
+        let blocks = self.positions.par_iter_mut().zip(&mut self.revisions).zip(&mut self.stale).enumerate();
+        blocks.with_min_len(64).filter(|(_, (_, stale))| **stale).for_each(
+            |(block, ((positions, revision), stale))| {
+                *positions = scene.block(block as u32);
+                (*revision, *stale) = (now, false);
+            },
+        );
+    }
+
+    fn forget(&mut self, vertex: VertexId) {
+        if let Some(revision) = self.revisions.get_mut(vertex as usize / BLOCK) {
+            *revision = 0;
+        }
+    }
+
+    #[inline]
+    fn position(&self, vertex: VertexId) -> [f64; 2] {
+        self.positions[vertex as usize / BLOCK][vertex as usize % BLOCK]
+    }
 }
 
 impl ShaftIndex {
@@ -76,36 +134,40 @@ impl ShaftIndex {
     }
 
     /// Calls `act` for each cone with all segments that may lie within `reach` of it, those of its own shaft included, and
-    /// returns what it makes of them, in the order of the cones. The order of segments is that of their vertices.
-    pub fn for_each<T: Send>(
+    /// returns what it makes of them, in the order of the cones. The order of segments is that of their vertices; `S` is what a
+    /// thread works with.
+    pub fn for_each<S: Default + Send, T: Send>(
         &mut self,
         scene: &ShaftScene,
         cones: &[Asking],
-        act: impl Fn(&Asking, &[Segment]) -> T + Sync,
+        act: impl Fn(&mut S, &Asking, &Segments<2>) -> T + Sync,
     ) -> Vec<T> {
         let side = SIDE * self.reach;
         let mut order: Vec<(Square, u32)> =
             cones.iter().zip(0..).map(|(cone, i)| (square(scene.reference(cone.site), side), i)).collect();
         order.sort_unstable();
         self.prepare(scene, &order);
-        let groups: Vec<&[(Square, u32)]> =
-            order.chunk_by(|a, b| a.0 == b.0).flat_map(|group| group.chunks(SHARED)).collect();
-        let mut found: Vec<(u32, T)> = groups
-            .par_iter()
-            .map_init(Vec::new, |segments, group| {
-                scene.gather(&self.lists[&group[0].0], group, cones, self.reach, segments);
-                let each = |&(_, i): &(Square, u32)| (i, act(&cones[i as usize], segments));
-                group.iter().map(each).collect::<Vec<_>>()
+        let groups: Vec<&[(Square, u32)]> = order.chunk_by(|a, b| a.0 == b.0).collect();
+        let (columns, workplaces) = (Pool::<Segments<2>>::default(), Pool::<S>::default());
+        let serve = |segments: &Segments<2>, part: &[(Square, u32)]| -> Vec<(u32, T)> {
+            let each = |work: &mut S| part.iter().map(|&(_, i)| (i, act(work, &cones[i as usize], segments))).collect();
+            workplaces.lend(each)
+        };
+        let serve_group = |group: &&[(Square, u32)]| -> Vec<(u32, T)> {
+            columns.lend(|segments| {
+                self.gather(scene, group, cones, segments);
+                let segments = &*segments;
+                group.par_chunks(SHARED).with_max_len(1).map(|part| serve(segments, part)).flatten_iter().collect()
             })
-            .flatten_iter()
-            .collect();
+        };
+        let mut found: Vec<(u32, T)> = groups.par_iter().with_max_len(1).map(serve_group).flatten_iter().collect();
         found.sort_unstable_by_key(|(i, _)| *i);
         found.into_iter().map(|(_, value)| value).collect()
     }
 
     /// Makes sure that there is a valid list for each square in use, and for no other.
     fn prepare(&mut self, scene: &ShaftScene, order: &[(Square, u32)]) {
-        let needed = self.reach * scene.configuration.inverse_stretch;
+        let needed = self.reach * scene.configuration.inverse_stretch(&scene.tissue.mesh);
         if needed > self.radius {
             self.radius = needed * if scene.configuration.moves { ROOM } else { 1.0 };
             self.lists.clear();
@@ -118,10 +180,31 @@ impl ShaftIndex {
         let side = SIDE * self.reach;
         let made: Vec<_> = missing.into_par_iter().map(|at| (at, ask(&self.tree, at, side, margin))).collect();
         self.lists.extend(made);
+        self.places.bring_up_to_date(scene, self.lists.values().flatten());
+    }
+
+    /// The segments of a square's list that come near any cone of a group.
+    fn gather(&self, scene: &ShaftScene, group: &[(Square, u32)], cones: &[Asking], segments: &mut Segments<2>) {
+        let positions = || group.iter().map(|(_, i)| cones[*i as usize].position.xy());
+        let low = positions().fold(Vector2::repeat(f64::INFINITY), |m, x| m.inf(&x)).add_scalar(-self.reach);
+        let high = positions().fold(Vector2::repeat(f64::NEG_INFINITY), |m, x| m.sup(&x)).add_scalar(self.reach);
+        segments.clear();
+        for &vertex in &self.lists[&group[0].0] {
+            let start = self.places.position(vertex);
+            let end = match scene.shafts.successor(vertex) {
+                Successor::Vertex(next) => self.places.position(next),
+                Successor::Tip(shaft) => scene.position(scene.shafts.tip(shaft)),
+            };
+            let apart = |k: usize| start[k].max(end[k]) < low[k] || start[k].min(end[k]) > high[k];
+            if !apart(0) && !apart(1) {
+                segments.push(start, end, scene.shafts.owner(vertex));
+            }
+        }
     }
 
     fn add(&mut self, vertex: VertexId, at: [f64; 2], longest: f64) {
         self.tree.insert(Entry::new(at, vertex));
+        self.places.forget(vertex);
         let side = SIDE * self.reach;
         let margin = self.radius + longest;
         let low = square(Vector3::new(at[0] - margin, at[1] - margin, 0.0), side);
@@ -166,51 +249,19 @@ impl ShaftScene<'_> {
         self.tissue.reference_position(site)
     }
 
-    /// Position of a stored vertex now (µm).
-    fn vertex(&self, vertex: VertexId) -> Vector3<f64> {
-        self.configuration.position(&self.tissue.mesh, self.shafts.point(vertex).into())
+    /// Position of a material point now (µm).
+    #[inline]
+    fn position(&self, point: MaterialPoint<2>) -> [f64; 2] {
+        point.position(&self.tissue.mesh, &self.configuration.coordinates)
     }
 
-    /// Position now of what follows a stored vertex (µm).
-    fn end(&self, successor: Successor) -> Vector3<f64> {
-        match successor {
-            Successor::Vertex(next) => self.vertex(next),
-            Successor::Tip(shaft) => self.configuration.position(&self.tissue.mesh, self.shafts.tip(shaft).into()),
+    /// Positions now of a block's vertices (µm), zeros for those not yet stored.
+    fn block(&self, block: u32) -> [[f64; 2]; BLOCK] {
+        let mut positions = [[0.0; 2]; BLOCK];
+        for (position, vertex) in positions.iter_mut().zip(self.shafts.block_vertices(block)) {
+            *position = self.position(self.shafts.point(vertex));
         }
-    }
-
-    /// The segments of a sorted list that come near any cone of a group.
-    fn gather(
-        &self,
-        list: &[VertexId],
-        group: &[(Square, u32)],
-        cones: &[Asking],
-        reach: f64,
-        segments: &mut Vec<Segment>,
-    ) {
-        let positions = || group.iter().map(|(_, i)| cones[*i as usize].position);
-        let low = positions().fold(Vector3::repeat(f64::INFINITY), |m, x| m.inf(&x)).add_scalar(-reach);
-        let high = positions().fold(Vector3::repeat(f64::NEG_INFINITY), |m, x| m.sup(&x)).add_scalar(reach);
-        segments.clear();
-        let mut last = None;
-        for &vertex in list {
-            let start = match last {
-                Some((Successor::Vertex(next), end)) if next == vertex => end,
-                _ => self.vertex(vertex),
-            };
-            let successor = self.shafts.successor(vertex);
-            let end = self.end(successor);
-            last = Some((successor, end));
-            let apart = |k: usize| start[k].max(end[k]) < low[k] || start[k].min(end[k]) > high[k];
-            if apart(0) || apart(1) || apart(2) {
-                continue;
-            }
-            let chord = end - start;
-            let length = chord.norm();
-            if length > 0.0 {
-                segments.push(Segment { start, tangent: chord / length, length, shaft: self.shafts.owner(vertex) });
-            }
-        }
+        positions
     }
 }
 

@@ -91,6 +91,22 @@ impl Shafts {
         self.used.iter().map(|&n| n as usize).sum()
     }
 
+    /// Number of blocks.
+    pub fn block_count(&self) -> usize {
+        self.used.len()
+    }
+
+    /// The vertices stored in a block, ascending.
+    pub fn block_vertices(&self, block: u32) -> std::ops::Range<VertexId> {
+        let first = block * BLOCK as u32;
+        first..first + u32::from(self.used[block as usize])
+    }
+
+    /// The block in which the shaft of a block goes on.
+    pub fn block_after(&self, block: u32) -> Option<u32> {
+        Some(self.next[block as usize]).filter(|&next| next != NONE)
+    }
+
     /// Starts a shaft at a site, whose reference position is `at` (µm).
     pub fn start(&mut self, shaft: usize, site: Site, at: [f64; 2], time: f64) {
         self.push(shaft, site, time as f32);

@@ -7,6 +7,7 @@ use crate::numerics::polygon::{nearest_on_side, sides};
 use crate::numerics::simplex_mesh::{BorderFacet, SimplexMesh};
 use bevy_ecs::prelude::Resource;
 use nalgebra::{Matrix2, Vector2, Vector3};
+use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -73,8 +74,6 @@ pub struct Configuration {
     pub load_rate: f64,
     /// Counts the changes of configuration; 0 for the reference.
     pub revision: u64,
-    /// Upper bound of ‖F⁻¹‖₂ over the tissue: a spatial distance r is at most `r · inverse_stretch` in the reference.
-    pub inverse_stretch: f64,
 }
 
 impl Configuration {
@@ -88,7 +87,6 @@ impl Configuration {
             load: 0.0,
             load_rate: 0.0,
             revision: 0,
-            inverse_stretch: 1.0,
         }
     }
 
@@ -138,16 +136,18 @@ impl Configuration {
         }
     }
 
-    /// Recomputes the bound of ‖F⁻¹‖₂ from all cells.
-    pub fn bound_inverse_stretch(&mut self, mesh: &SimplexMesh<2>) {
-        let mut bound: f64 = 0.0;
-        for cell in 0..mesh.cell_count() as u32 {
+    /// Upper bound of ‖F⁻¹‖₂ over the tissue: a spatial distance r is at most `r · inverse_stretch()` in the reference.
+    pub fn inverse_stretch(&self, mesh: &SimplexMesh<2>) -> f64 {
+        if !self.moves {
+            return 1.0;
+        }
+        let of_cell = |cell: u32| {
             let f = self.deformation_gradient(mesh, cell);
             let (half, det) = (0.5 * f.norm_squared(), f.determinant());
-            let largest = (half + (half * half - det * det).max(0.0).sqrt()).sqrt();
-            bound = bound.max(largest / det);
-        }
-        self.inverse_stretch = bound * (1.0 + 1e-12);
+            (half + (half * half - det * det).max(0.0).sqrt()).sqrt() / det
+        };
+        let cells = (0..mesh.cell_count() as u32).into_par_iter().with_min_len(1024);
+        cells.map(of_cell).reduce(|| 0.0, f64::max) * (1.0 + 1e-12)
     }
 }
 

@@ -1,4 +1,4 @@
-//! The integral of a contact law over straight segments, in closed form, four segments at a time.
+//! The integral of a contact law over straight segments, in closed form.
 //!
 //! A cone at the origin with unit heading e feels the points of a segment within reach R and within an angle Θ of e. With s
 //! the place along the segment from the point nearest to the cone, n the vector to that point and ρ = √(n² + s²), attraction
@@ -10,27 +10,23 @@
 //!
 //! over the part of the segment that is felt. What lies within a circular cone of half-angle below 90° is one interval of a line,
 //! so the felt part is the clipped segment's share inside the cone (Θ < 90°), or the clipped segment without its share in the
-//! cone behind (Θ ≥ 90°). The values are additive: cutting a segment changes nothing beyond round-off. Each lane depends on its
-//! own segment alone, so that results do not depend on how segments are grouped.
+//! cone behind (Θ ≥ 90°). The values are additive: cutting a segment changes nothing beyond round-off.
+//!
+//! Every function takes one segment and has no branches, so that a loop over columns of segments runs in vector registers.
 
-use wide::f64x4;
-
-/// Segments handled at once.
-pub const LANES: usize = 4;
-
-/// Four segments as a cone sees them; unused lanes may hold zeros.
+/// A segment as a cone sees it.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct SegmentLanes {
+pub struct Sight {
     /// n², squared distance of the line (µm²).
-    pub gap: [f64; LANES],
+    pub gap: f64,
     /// s at the segment's start (µm).
-    pub first: [f64; LANES],
+    pub first: f64,
     /// s at its end, not before the start (µm).
-    pub last: [f64; LANES],
+    pub last: f64,
     /// t·e of the unit tangent.
-    pub along: [f64; LANES],
+    pub along: f64,
     /// n·e (µm).
-    pub across: [f64; LANES],
+    pub across: f64,
 }
 
 /// What is felt: reach and sector.
@@ -42,94 +38,86 @@ pub struct Felt {
     pub cos_sector: f64,
 }
 
-/// How much of a segment lies within the sector, as far as its ends tell (both sector and what lies behind it are convex for
+/// How much of a segment is felt, as far as its ends tell (both sector and what lies behind it are convex for
 /// Θ ≥ 90°, up to the rim).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(u64)]
 pub enum View {
-    /// All of it.
+    /// Nothing: out of reach, or in the cone behind.
+    Nothing,
+    /// What is within reach lies in the sector as a whole.
     Whole,
     /// Perhaps a part.
     Part,
-    /// Nothing: it lies in the cone behind.
-    Nothing,
 }
 
 /// An interval of s.
 #[derive(Clone, Copy)]
 struct Interval {
-    low: f64x4,
-    high: f64x4,
+    low: f64,
+    high: f64,
 }
 
-/// W₀ without its logarithm, W₁, and the ratio whose logarithm is asinh(high/|n|) − asinh(low/|n|).
+/// W₀ without its logarithm, W₁, and the ratio (above, below) whose logarithm is asinh(high/|n|) − asinh(low/|n|).
 struct Parts {
-    plain: f64x4,
-    first_moment: f64x4,
-    ratio: f64x4,
+    plain: f64,
+    first_moment: f64,
+    ratio: [f64; 2],
 }
 
 impl Felt {
-    /// Which part of a segment can be felt, from its ends alone: `across + along·s` at each end and ρ² there.
-    #[inline]
-    pub fn view(&self, ends: [f64; 2], squares: [f64; 2]) -> View {
-        if self.cos_sector < -1.0 {
-            return View::Whole;
-        }
-        if self.cos_sector > 0.0 {
-            return View::Part;
-        }
-        let c2 = self.cos_sector * self.cos_sector;
-        let behind = |k: usize| ends[k] < 0.0 && ends[k] * ends[k] >= c2 * squares[k];
-        if ends[0] >= 0.0 && ends[1] >= 0.0 {
-            View::Whole
-        } else if behind(0) && behind(1) {
-            View::Nothing
-        } else {
-            View::Part
-        }
+    /// How much of a segment is felt.
+    #[inline(always)]
+    pub fn view(&self, sight: &Sight) -> View {
+        let Sight { gap, first, last, along, across } = *sight;
+        let outside = larger(larger(first, -last), 0.0);
+        let within = gap + outside * outside < self.reach * self.reach;
+        let cosine = if self.cos_sector > 0.0 { f64::INFINITY } else { self.cos_sector };
+        let ends = [across + along * first, across + along * last];
+        let squares = [gap + first * first, gap + last * last];
+        let behind = |k: usize| (ends[k] < 0.0) & (ends[k] * ends[k] >= cosine * cosine * squares[k]);
+        let ahead = (ends[0] >= 0.0) & (ends[1] >= 0.0) & (self.cos_sector <= 0.0);
+        let everywhere = self.cos_sector < -1.0;
+        let nothing = !within | (!everywhere & behind(0) & behind(1));
+        let felt = if ahead | everywhere { View::Whole } else { View::Part };
+        if nothing { View::Nothing } else { felt }
     }
 
-    /// W₀ (µm) and W₁ (µm²) of four segments that lie within the sector as a whole.
-    #[inline]
-    pub fn moments_of_whole(&self, lanes: &SegmentLanes) -> [[f64; LANES]; 2] {
-        let gap = f64x4::from(lanes.gap);
-        self.finish(gap, &self.parts(gap, self.clipped(gap, lanes)))
+    /// W₀ (µm) and W₁ (µm²) of the part within reach, whatever the sector.
+    #[inline(always)]
+    pub fn moments_within_reach(&self, sight: &Sight) -> [f64; 2] {
+        self.finish(sight.gap, &self.parts(sight.gap, self.clipped(sight)))
     }
 
-    #[inline]
-    fn clipped(&self, gap: f64x4, lanes: &SegmentLanes) -> Interval {
-        let room = (f64x4::splat(self.reach * self.reach) - gap).fast_max(f64x4::ZERO).sqrt();
-        let low = f64x4::from(lanes.first).fast_max(-room);
-        Interval { low, high: f64x4::from(lanes.last).fast_min(room).fast_max(low) }
-    }
-
-    #[inline]
-    fn finish(&self, gap: f64x4, parts: &Parts) -> [[f64; LANES]; 2] {
-        let w0 = parts.plain - gap * parts.ratio.ln() * (1.0 / self.reach);
-        [w0.to_array(), parts.first_moment.to_array()]
-    }
-
-    /// W₀ (µm) and W₁ (µm²) of four segments.
-    #[inline]
-    pub fn moments(&self, lanes: &SegmentLanes) -> [[f64; LANES]; 2] {
-        let gap = f64x4::from(lanes.gap);
-        let clipped = self.clipped(gap, lanes);
+    /// W₀ (µm) and W₁ (µm²) of the part within reach and sector.
+    #[inline(always)]
+    pub fn moments_within_sector(&self, sight: &Sight) -> [f64; 2] {
+        let clipped = self.clipped(sight);
         let sign = if self.cos_sector > 0.0 { 1.0 } else { -1.0 };
-        let within = || {
-            let (along, across) = (f64x4::from(lanes.along) * sign, f64x4::from(lanes.across) * sign);
-            cone_share(gap, along, across, self.cos_sector.abs(), clipped)
-        };
+        let share = cone_share(sight, sign, self.cos_sector.abs(), clipped);
         let parts = if self.cos_sector > 0.0 {
-            self.parts(gap, within())
+            self.parts(sight.gap, share)
         } else {
-            let all = self.parts(gap, clipped);
-            if self.cos_sector < -1.0 { all } else { all.without(&self.parts(gap, within())) }
+            let all = self.parts(sight.gap, clipped);
+            if self.cos_sector < -1.0 { all } else { all.without(&self.parts(sight.gap, share)) }
         };
-        self.finish(gap, &parts)
+        self.finish(sight.gap, &parts)
     }
 
-    #[inline]
-    fn parts(&self, gap: f64x4, Interval { low, high }: Interval) -> Parts {
+    #[inline(always)]
+    fn clipped(&self, sight: &Sight) -> Interval {
+        let room = larger(self.reach * self.reach - sight.gap, 0.0).sqrt();
+        let low = larger(sight.first, -room);
+        Interval { low, high: larger(smaller(sight.last, room), low) }
+    }
+
+    #[inline(always)]
+    fn finish(&self, gap: f64, parts: &Parts) -> [f64; 2] {
+        [parts.plain - gap * logarithm(parts.ratio) * (1.0 / self.reach), parts.first_moment]
+    }
+
+    #[inline(always)]
+    fn parts(&self, gap: f64, Interval { low, high }: Interval) -> Parts {
         let r = 1.0 / self.reach;
         let (low2, high2) = (low * low, high * high);
         let (rho_low, rho_high) = ((gap + low2).sqrt(), (gap + high2).sqrt());
@@ -144,51 +132,128 @@ impl Felt {
 }
 
 impl Parts {
+    #[inline(always)]
     fn without(&self, other: &Self) -> Self {
         Self {
             plain: self.plain - other.plain,
             first_moment: self.first_moment - other.first_moment,
-            ratio: self.ratio / other.ratio,
+            ratio: [self.ratio[0] * other.ratio[1], self.ratio[1] * other.ratio[0]],
         }
     }
 }
 
-/// exp(asinh(high/|n|) − asinh(low/|n|)), without cancellation for either sign: |s| + ρ is large where s + ρ would cancel.
-#[inline]
-fn asinh_ratio(gap: f64x4, (low, rho_low): (f64x4, f64x4), (high, rho_high): (f64x4, f64x4)) -> f64x4 {
-    let tiny = f64x4::splat(1e-150);
-    let at_low = low.abs() + rho_low.fast_max(tiny);
-    let at_high = high.abs() + rho_high.fast_max(tiny);
-    let ahead = low.simd_ge(f64x4::ZERO);
-    let behind = high.simd_lt(f64x4::ZERO);
-    let mixed = at_high * at_low / gap.fast_max(tiny);
-    ahead.select(at_high / at_low, behind.select(at_low / at_high, mixed))
+/// The larger of two numbers, as one instruction (no case for NaN).
+#[inline(always)]
+fn larger(a: f64, b: f64) -> f64 {
+    if a > b { a } else { b }
 }
 
-/// The share of an interval that lies inside the cone across + along·s ≥ c√(gap + s²), 0 ≤ c < 1; empty shares have equal ends.
-#[inline]
-fn cone_share(gap: f64x4, along: f64x4, across: f64x4, c: f64, within: Interval) -> Interval {
-    let zero = f64x4::ZERO;
-    let a = along * along - f64x4::splat(c * c);
-    let a = a.abs().simd_lt(f64x4::splat(1e-14)).select(f64x4::splat(1e-14), a);
+/// The smaller of two numbers.
+#[inline(always)]
+fn smaller(a: f64, b: f64) -> f64 {
+    if a < b { a } else { b }
+}
+
+/// exp(asinh(high/|n|) − asinh(low/|n|)) as a ratio, without cancellation for either sign: |s| + ρ is large where s + ρ would
+/// cancel.
+#[inline(always)]
+fn asinh_ratio(gap: f64, (low, rho_low): (f64, f64), (high, rho_high): (f64, f64)) -> [f64; 2] {
+    const TINY: f64 = 1e-150;
+    let at_low = low.abs() + larger(rho_low, TINY);
+    let at_high = high.abs() + larger(rho_high, TINY);
+    let (ahead, behind) = (low >= 0.0, high < 0.0);
+    let above = if ahead {
+        at_high
+    } else if behind {
+        at_low
+    } else {
+        at_high * at_low
+    };
+    let below = if ahead {
+        at_low
+    } else if behind {
+        at_high
+    } else {
+        larger(gap, TINY)
+    };
+    [above, below]
+}
+
+/// The share of an interval that lies inside the cone across + along·s ≥ c√(gap + s²), 0 ≤ c < 1, about the heading (`sign` 1)
+/// or about what is behind (−1); empty shares have equal ends.
+#[inline(always)]
+fn cone_share(sight: &Sight, sign: f64, c: f64, within: Interval) -> Interval {
+    let (along, across) = (sight.along * sign, sight.across * sign);
+    let a = along * along - c * c;
+    let a = if a.abs() < 1e-14 { 1e-14 } else { a };
     let b = along * across;
-    let constant = across * across - gap * (c * c);
+    let constant = across * across - sight.gap * (c * c);
     let discriminant = b * b - a * constant;
-    let root = discriminant.fast_max(zero).sqrt();
-    let q = -(b + b.simd_lt(zero).select(-root, root));
-    let q = q.abs().simd_lt(f64x4::splat(1e-200)).select(f64x4::splat(1e-200), q);
+    let root = larger(discriminant, 0.0).sqrt();
+    let q = -(b + if b < 0.0 { -root } else { root });
+    let q = if q.abs() < 1e-200 { 1e-200 } else { q };
     let (one, two) = (q / a, constant / q);
-    let (lower, upper) = (one.fast_min(two), one.fast_max(two));
-    let far = f64x4::splat(f64::MAX);
+    let (lower, upper) = (smaller(one, two), larger(one, two));
     // A line steeper than the cone enters it once; one less steep passes through it, through its mirror image, or neither.
-    let steep = a.simd_gt(zero);
-    let forward = along.simd_gt(zero);
+    let steep = a > 0.0;
+    let forward = along > 0.0;
     let middle = (lower + upper) * 0.5;
-    let passes = discriminant.simd_gt(zero) & (across + along * middle).simd_gt(zero);
-    let start = steep.select(forward.select(upper, -far), passes.select(lower, far));
-    let end = steep.select(forward.select(far, lower), passes.select(upper, -far));
-    let low = within.low.fast_max(start).fast_min(within.high);
-    Interval { low, high: within.high.fast_min(end).fast_max(low) }
+    let passes = (discriminant > 0.0) & (across + along * middle > 0.0);
+    let entry = if forward { upper } else { f64::MIN };
+    let exit = if forward { f64::MAX } else { lower };
+    let start = if steep {
+        entry
+    } else if passes {
+        lower
+    } else {
+        f64::MAX
+    };
+    let end = if steep {
+        exit
+    } else if passes {
+        upper
+    } else {
+        f64::MIN
+    };
+    let low = smaller(larger(within.low, start), within.high);
+    Interval { low, high: larger(smaller(within.high, end), low) }
+}
+
+/// Natural logarithm of the ratio of two positive normal numbers, to a few units in the last place, with one division and
+/// without branches: above/below = 2ᵏ(1 + s)/(1 − s) with |s| ≤ 0.172, and log((1 + s)/(1 − s)) = 2s + s·R(s²), R the polynomial of
+/// least maximum error that Tang's and the C library's methods use.
+#[inline(always)]
+fn logarithm([above, below]: [f64; 2]) -> f64 {
+    const SQRT_HALF: u64 = 0x3fe6_a09e_667f_3bcd;
+    const ONE: u64 = 0x3ff0_0000_0000_0000;
+    const MANTISSA: u64 = 0x000f_ffff_ffff_ffff;
+    const TWO_52: u64 = 0x4330_0000_0000_0000;
+    const SQRT_2: f64 = std::f64::consts::SQRT_2;
+    // Both as 2ᵏm with m in [√½, √2): no case is left but a ratio of the m's outside that range.
+    let split = |x: f64| {
+        let bits = x.to_bits().wrapping_add(ONE - SQRT_HALF);
+        (f64::from_bits((bits >> 52) | TWO_52), f64::from_bits((bits & MANTISSA) + SQRT_HALF))
+    };
+    let ((k_above, a), (k_below, b)) = (split(above), split(below));
+    let (large, small) = (a > b * SQRT_2, b > a * SQRT_2);
+    let a = if large { 0.5 * a } else { a };
+    let b = if small { 0.5 * b } else { b };
+    let k = (k_above - k_below)
+        + if large {
+            1.0
+        } else if small {
+            -1.0
+        } else {
+            0.0
+        };
+    let s = (a - b) / (a + b);
+    let z = s * s;
+    let w = z * z;
+    let even = w * (0.399_999_999_994_094_2 + w * (0.222_221_984_321_497_84 + w * 0.153_138_376_992_093_73));
+    let odd = z
+        * (0.666_666_666_666_673_5
+            + w * (0.285_714_287_436_623_9 + w * (0.181_835_721_616_180_5 + w * 0.147_981_986_051_165_86)));
+    k * std::f64::consts::LN_2 + (2.0 * s + s * (even + odd))
 }
 
 #[cfg(test)]
@@ -196,15 +261,14 @@ mod tests {
     use super::*;
 
     /// W₀ and W₁ by brute force, the sector tested point by point.
-    fn brute_force(felt: &Felt, lanes: &SegmentLanes, lane: usize) -> [f64; 2] {
+    fn brute_force(felt: &Felt, sight: &Sight) -> [f64; 2] {
         let n = 400_000;
-        let (first, last) = (lanes.first[lane], lanes.last[lane]);
-        let step = (last - first) / n as f64;
+        let step = (sight.last - sight.first) / n as f64;
         let mut sum = [0.0; 2];
         for i in 0..n {
-            let s = first + (i as f64 + 0.5) * step;
-            let rho = (lanes.gap[lane] + s * s).sqrt();
-            if rho < felt.reach && lanes.across[lane] + lanes.along[lane] * s >= felt.cos_sector * rho {
+            let s = sight.first + (i as f64 + 0.5) * step;
+            let rho = (sight.gap + s * s).sqrt();
+            if rho < felt.reach && sight.across + sight.along * s >= felt.cos_sector * rho {
                 let w = (1.0 - rho / felt.reach).powi(2) * step;
                 sum = [sum[0] + w, sum[1] + w * s];
             }
@@ -212,29 +276,22 @@ mod tests {
         sum
     }
 
-    fn four() -> SegmentLanes {
-        SegmentLanes {
-            gap: [9.0, 0.0, 30.0, 64.0],
-            first: [-20.0, -3.0, 1.0, -7.0],
-            last: [20.0, 8.0, 6.0, -0.5],
-            along: [0.9, 1.0, -0.3, 0.1],
-            across: [1.1, 0.0, -4.0, 7.0],
-        }
-    }
+    const FOUR: [Sight; 4] = [
+        Sight { gap: 9.0, first: -20.0, last: 20.0, along: 0.9, across: 1.1 },
+        Sight { gap: 0.0, first: -3.0, last: 8.0, along: 1.0, across: 0.0 },
+        Sight { gap: 30.0, first: 1.0, last: 6.0, along: -0.3, across: -4.0 },
+        Sight { gap: 64.0, first: -7.0, last: -0.5, along: 0.1, across: 7.0 },
+    ];
 
     #[test]
     fn closed_forms_equal_the_integrals_for_wide_and_narrow_sectors() {
         for cos_sector in [-2.0, -0.5, 0.0, 0.3, 0.9] {
             let felt = Felt { reach: 10.0, cos_sector };
-            for mirror in [1.0, -1.0] {
-                let mut lanes = four();
-                lanes.along = lanes.along.map(|x| mirror * x);
-                let [w0, w1] = felt.moments(&lanes);
-                for lane in 0..LANES {
-                    let [b0, b1] = brute_force(&felt, &lanes, lane);
-                    let error = (w0[lane] - b0).abs().max((w1[lane] - b1).abs() / 10.0);
-                    assert!(error < 2e-4, "cos {cos_sector}, lane {lane}: {} {b0}, {} {b1}", w0[lane], w1[lane]);
-                }
+            for (sight, mirror) in FOUR.iter().flat_map(|sight| [(sight, 1.0), (sight, -1.0)]) {
+                let sight = Sight { along: mirror * sight.along, ..*sight };
+                let ([w0, w1], [b0, b1]) = (felt.moments_within_sector(&sight), brute_force(&felt, &sight));
+                let error = (w0 - b0).abs().max((w1 - b1).abs() / 10.0);
+                assert!(error < 2e-4, "cos {cos_sector}, {sight:?}: {w0} {b0}, {w1} {b1}");
             }
         }
     }
@@ -245,63 +302,55 @@ mod tests {
         for (first, last, along, across, view) in [
             (1.0, 5.0, 0.6, 2.0, View::Whole),
             (-9.0, -6.0, 1.0, 0.0, View::Nothing),
+            (9.9, 12.0, 1.0, 0.0, View::Nothing),
             (-9.0, 6.0, 1.0, 0.0, View::Part),
         ] {
-            let ends = [across + along * first, across + along * last];
-            assert_eq!(felt.view(ends, [4.0 + first * first, 4.0 + last * last]), view);
-            let lanes = SegmentLanes {
-                gap: [4.0; LANES],
-                first: [first; LANES],
-                last: [last; LANES],
-                along: [along; LANES],
-                across: [across; LANES],
-            };
-            let found = felt.moments(&lanes);
+            let sight = Sight { gap: 4.0, first, last, along, across };
+            assert_eq!(felt.view(&sight), view, "{sight:?}");
+            let found = felt.moments_within_sector(&sight);
             match view {
                 View::Whole => {
-                    let whole = felt.moments_of_whole(&lanes);
-                    assert!((0..2).all(|k| (whole[k][0] - found[k][0]).abs() < 1e-13));
+                    let whole = felt.moments_within_reach(&sight);
+                    assert!((0..2).all(|k| (whole[k] - found[k]).abs() < 1e-13));
                 }
-                View::Nothing => assert!(found[0][0].abs() < 1e-13 && found[1][0].abs() < 1e-12),
-                View::Part => assert!(found[0][0] > 0.1),
+                View::Nothing => assert!(found[0].abs() < 1e-13 && found[1].abs() < 1e-12),
+                View::Part => assert!(found[0] > 0.1),
             }
         }
+    }
+
+    #[test]
+    fn a_narrow_sector_and_none_are_seen_as_part_and_whole() {
+        let sight = FOUR[2];
+        assert_eq!(Felt { reach: 10.0, cos_sector: 0.3 }.view(&sight), View::Part);
+        assert_eq!(Felt { reach: 10.0, cos_sector: -2.0 }.view(&sight), View::Whole);
+        assert_eq!(Felt { reach: 5.0, cos_sector: -2.0 }.view(&sight), View::Nothing);
     }
 
     #[test]
     fn parts_of_a_segment_add_up_to_it() {
         let felt = Felt { reach: 10.0, cos_sector: -0.5 };
-        let whole = felt.moments(&four());
-        for share in [0.1, 0.37, 0.8] {
-            let (mut left, mut right) = (four(), four());
-            for lane in 0..LANES {
-                let cut = left.first[lane] + share * (left.last[lane] - left.first[lane]);
-                (left.last[lane], right.first[lane]) = (cut, cut);
-            }
-            let (left, right) = (felt.moments(&left), felt.moments(&right));
-            for k in 0..2 {
-                for lane in 0..LANES {
-                    assert!((left[k][lane] + right[k][lane] - whole[k][lane]).abs() < 1e-13);
-                }
-            }
+        for (sight, share) in FOUR.iter().flat_map(|sight| [0.1, 0.37, 0.8].map(|share| (sight, share))) {
+            let cut = sight.first + share * (sight.last - sight.first);
+            let whole = felt.moments_within_sector(sight);
+            let (left, right) = (
+                felt.moments_within_sector(&Sight { last: cut, ..*sight }),
+                felt.moments_within_sector(&Sight { first: cut, ..*sight }),
+            );
+            assert!((0..2).all(|k| (left[k] + right[k] - whole[k]).abs() < 1e-13), "{sight:?} {share}");
         }
     }
 
     #[test]
-    fn a_lane_does_not_feel_the_others_and_empty_lanes_give_zero() {
-        let felt = Felt { reach: 10.0, cos_sector: -0.5 };
-        let together = felt.moments(&four());
-        for lane in 0..LANES {
-            let mut alone = SegmentLanes::default();
-            alone.gap[3 - lane] = four().gap[lane];
-            alone.first[3 - lane] = four().first[lane];
-            alone.last[3 - lane] = four().last[lane];
-            alone.along[3 - lane] = four().along[lane];
-            alone.across[3 - lane] = four().across[lane];
-            let found = felt.moments(&alone);
-            assert_eq!(found[0][3 - lane].to_bits(), together[0][lane].to_bits());
-            assert_eq!(found[1][3 - lane].to_bits(), together[1][lane].to_bits());
-            assert!((0..LANES).filter(|other| *other != 3 - lane).all(|other| found[0][other] == 0.0));
+    fn the_logarithm_of_a_ratio_is_good_to_a_few_units_in_the_last_place() {
+        for i in 0..200_000 {
+            let x = 1e-3 * 1.000_13_f64.powi(i % 100_000) * (1.0 + f64::from(i) * 1e-9);
+            let below = 0.3 + f64::from(i % 1009) * 0.01;
+            let (found, expected) = (logarithm([x * below, below]), (x * below / below).ln());
+            let room = 3.0 * f64::EPSILON * expected.abs().max(1.0);
+            assert!((found - expected).abs() <= room, "{x} {below}: {found} {expected}");
         }
+        assert_eq!(logarithm([1.0, 1.0]), 0.0);
+        assert_eq!(logarithm([1e-150, 1e-150]), 0.0);
     }
 }

@@ -30,6 +30,7 @@ impl<const D: usize> MaterialPoint<D> {
     }
 
     /// Position at the given vertex coordinates (µm): `x = Σ λ_i x_i`.
+    #[inline]
     pub fn position(&self, mesh: &SimplexMesh<D>, coordinates: &[[f64; D]]) -> [f64; D] {
         self.interpolate_vector(mesh, coordinates)
     }
@@ -42,6 +43,7 @@ impl<const D: usize> MaterialPoint<D> {
     }
 
     /// Value at the point of a vector given at the vertices.
+    #[inline]
     pub fn interpolate_vector<const N: usize>(&self, mesh: &SimplexMesh<D>, values: &[[f64; N]]) -> [f64; N] {
         let corners = mesh.cell(self.cell as usize);
         let base = values[corners[0] as usize];

@@ -18,6 +18,7 @@ pub mod quadrature;
 pub mod reaction_diffusion;
 pub mod recovery;
 pub mod runge_kutta;
+pub mod segments;
 pub mod simplex_mesh;
 pub mod sparse;
 pub mod triangulate;

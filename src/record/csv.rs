@@ -2,8 +2,13 @@
 //! the same bits.
 
 use super::output::{WriteError, write_atomically};
+use rayon::prelude::*;
+use std::borrow::Cow;
 use std::fmt::Write;
 use std::path::Path;
+
+/// Rows formatted as one task.
+const PIECE: usize = 128;
 
 /// One entry of a table.
 #[derive(Debug, Clone, PartialEq)]
@@ -78,9 +83,9 @@ impl CsvTable {
             "" => (*name).to_owned(),
             unit => format!("{name} [{unit}]"),
         };
-        let mut table = Self { text: String::new(), columns: columns.len(), rows: 0 };
-        table.append_line(columns.iter().map(|column| quoted(&head(column))));
-        table
+        let mut text = String::new();
+        append_line(&mut text, &columns.iter().map(|column| Cell::Text(head(column))).collect::<Vec<_>>());
+        Self { text, columns: columns.len(), rows: 0 }
     }
 
     /// Appends a row.
@@ -91,8 +96,31 @@ impl CsvTable {
         if row.len() != self.columns {
             return Err(RowError { row: self.rows, found: row.len(), columns: self.columns });
         }
-        self.append_line(row.iter().map(formatted));
+        append_line(&mut self.text, row);
         self.rows += 1;
+        Ok(())
+    }
+
+    /// Appends `count` rows that `row` gives by their number; they are formatted in parallel and stand in order.
+    ///
+    /// # Errors
+    /// As [`Self::push`], if a row has not one entry a column.
+    pub fn push_all<const N: usize>(
+        &mut self,
+        count: usize,
+        row: impl Fn(usize) -> [Cell; N] + Sync,
+    ) -> Result<(), RowError> {
+        if N != self.columns {
+            return Err(RowError { row: self.rows, found: N, columns: self.columns });
+        }
+        let piece = |first: usize| {
+            let mut text = String::new();
+            (first..count.min(first + PIECE)).for_each(|i| append_line(&mut text, &row(i)));
+            text
+        };
+        let pieces: Vec<String> = (0..count.div_ceil(PIECE)).into_par_iter().map(|i| piece(i * PIECE)).collect();
+        pieces.iter().for_each(|piece| self.text.push_str(piece));
+        self.rows += count;
         Ok(())
     }
 
@@ -113,44 +141,45 @@ impl CsvTable {
     pub fn write(&self, path: &Path) -> Result<(), WriteError> {
         write_atomically(path, self.text.as_bytes())
     }
+}
 
-    fn append_line(&mut self, entries: impl Iterator<Item = String>) {
-        for (index, entry) in entries.enumerate() {
-            if index > 0 {
-                self.text.push(',');
-            }
-            self.text.push_str(&entry);
+fn append_line(text: &mut String, row: &[Cell]) {
+    for (index, cell) in row.iter().enumerate() {
+        if index > 0 {
+            text.push(',');
         }
-        self.text.push('\n');
+        append(text, cell);
     }
+    text.push('\n');
 }
 
 /// A number in the shortest form that reads back to the same bits, by exponent where plain digits would be long; an empty
 /// string for one that is not finite.
 pub fn format_number(value: f64) -> String {
     let mut text = String::new();
-    let magnitude = value.abs();
-    // Writing to a string cannot fail.
-    let _ = match magnitude {
-        _ if !value.is_finite() => Ok(()),
-        0.0 | 1e-4..1e15 => write!(text, "{value}"),
-        _ => write!(text, "{value:e}"),
-    };
+    append(&mut text, &Cell::Number(value));
     text
 }
 
-fn formatted(cell: &Cell) -> String {
-    match cell {
-        Cell::Number(value) => format_number(*value),
-        Cell::Integer(value) => value.to_string(),
-        Cell::Text(text) => quoted(text),
-        Cell::Flag(flag) => flag.to_string(),
-        Cell::Empty => String::new(),
-    }
+fn append(text: &mut String, cell: &Cell) {
+    // Writing to a string cannot fail.
+    let _ = match cell {
+        Cell::Number(value) if !value.is_finite() => Ok(()),
+        Cell::Number(value) if *value == 0.0 || (1e-4..1e15).contains(&value.abs()) => write!(text, "{value}"),
+        Cell::Number(value) => write!(text, "{value:e}"),
+        Cell::Integer(value) => write!(text, "{value}"),
+        Cell::Text(entry) => write!(text, "{}", quoted(entry)),
+        Cell::Flag(flag) => write!(text, "{flag}"),
+        Cell::Empty => Ok(()),
+    };
 }
 
-fn quoted(text: &str) -> String {
-    if text.contains([',', '"', '\n', '\r']) { format!("\"{}\"", text.replace('"', "\"\"")) } else { text.to_owned() }
+fn quoted(text: &str) -> Cow<'_, str> {
+    if text.contains([',', '"', '\n', '\r']) {
+        format!("\"{}\"", text.replace('"', "\"\"")).into()
+    } else {
+        text.into()
+    }
 }
 
 #[cfg(test)]

@@ -46,12 +46,16 @@ pub fn scale_for_dpi(dpi: f32) -> f32 {
 /// # Errors
 /// An SVG that cannot be read, a picture too large, an image in it that is no PNG.
 pub fn to_png(svg: &str, scale: f32) -> Result<Vec<u8>, PngError> {
-    let tree = usvg::Tree::from_str(svg, &options())?;
-    let mut canvas = white_canvas(tree.size(), scale)?;
     let to_pixels = Transform::from_scale(scale, scale);
-    draw_images(tree.root(), to_pixels, &mut canvas)?;
-    let drawings = usvg::Tree::from_str(svg, &options_without_images())?;
-    resvg::render(&drawings, to_pixels, &mut canvas.as_mut());
+    let images = || {
+        let tree = usvg::Tree::from_str(svg, &options())?;
+        let mut canvas = white_canvas(tree.size(), scale)?;
+        draw_images(tree.root(), to_pixels, &mut canvas)?;
+        Ok::<_, PngError>(canvas)
+    };
+    let (canvas, drawings) = rayon::join(images, || usvg::Tree::from_str(svg, &options_without_images()));
+    let mut canvas = canvas?;
+    resvg::render(&drawings?, to_pixels, &mut canvas.as_mut());
     canvas.encode_png().map_err(|error| PngError::Encode(error.to_string()))
 }
 

@@ -66,17 +66,17 @@ impl Recorder {
 
     fn add_points(&mut self, world: &World) -> Result<(), RowError> {
         let time = world.resource::<Clock>().hours();
-        for tip in tips(world) {
-            let heading = tip.heading[1].atan2(tip.heading[0]).to_degrees();
-            self.trajectories.push(&[
+        let tips = tips(world);
+        self.trajectories.push_all(tips.len(), |i| {
+            let tip = &tips[i];
+            [
                 Cell::from(time),
                 Cell::Integer(i64::from(tip.axon)),
                 Cell::from(tip.status.word()),
                 Cell::from(tip.position[0]),
                 Cell::from(tip.position[1]),
-                Cell::from(heading),
-            ])?;
-        }
-        Ok(())
+                Cell::from(tip.heading[1].atan2(tip.heading[0]).to_degrees()),
+            ]
+        })
     }
 }

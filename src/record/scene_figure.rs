@@ -11,6 +11,7 @@ use super::scene_legend::Legend;
 use super::scene_panel::PanelPainter;
 use super::svg::Svg;
 use super::theme;
+use rayon::prelude::*;
 
 /// More shafts than this in any panel, and the whole figure shows their density instead of lines.
 pub const MOST_LINES: usize = 3000;
@@ -183,12 +184,15 @@ pub fn to_svg(figure: &SceneFigure) -> Result<String, FigureError> {
     let mut svg = Svg::new(layout.width, layout.height + legend_height + theme::MARGIN);
     painter.define_gradients(&mut svg);
     layout.draw_heading(&mut svg);
-    for (index, panel) in figure.panels.iter().enumerate() {
-        let cell = layout.cell(index);
-        layout.draw_head(&mut svg, &cell, index);
-        painter.draw(&mut svg, panel, index, &cell.view)?;
-        layout.draw_foot(&mut svg, &cell, index);
-    }
+    let draw = |(index, panel): (usize, &Panel)| {
+        let (mut part, cell) = (svg.part(), layout.cell(index));
+        layout.draw_head(&mut part, &cell, index);
+        painter.draw(&mut part, panel, index, &cell.view)?;
+        layout.draw_foot(&mut part, &cell, index);
+        Ok(part)
+    };
+    let parts: Vec<Svg> = figure.panels.par_iter().enumerate().map(draw).collect::<Result<_, FigureError>>()?;
+    parts.into_iter().for_each(|part| svg.append(part));
     legend.draw(&mut svg, &placed, [theme::MARGIN, layout.height]);
     Ok(svg.finish())
 }

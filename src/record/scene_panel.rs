@@ -8,6 +8,7 @@ use super::raster::{Coverage, Sheet, Triangles, paint_cells};
 use super::scene_figure::{BorderLine, FigureError, MOST_LINES, Panel, SceneFigure, TipStatus};
 use super::svg::{Anchor, Label, Svg, number, path_data};
 use super::theme::{self, Font};
+use rayon::prelude::*;
 use resvg::tiny_skia::Pixmap;
 
 /// Pixels of the field's image for one px.
@@ -92,7 +93,7 @@ impl<'a> PanelPainter<'a> {
         Self {
             scales: [Effect::Attract, Effect::Repel].iter().filter_map(|&e| CueScale::of(panels, e)).collect(),
             ghost: ghosted.contains(&true).then_some(first),
-            densest: dense.then(|| panels.iter().map(coverage).max().unwrap_or(0)),
+            densest: dense.then(|| panels.par_iter().map(coverage).max().unwrap_or(0)),
             statuses: TipStatus::ALL.into_iter().filter(shown).collect(),
             targets: panels.iter().any(|panel| !panel.targets.is_empty()),
             ghosted,

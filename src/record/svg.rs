@@ -45,6 +45,16 @@ impl Svg {
         Self { width, height, body: String::new() }
     }
 
+    /// A drawing to be appended to this one.
+    pub fn part(&self) -> Self {
+        Self::new(self.width, self.height)
+    }
+
+    /// Appends what was drawn on a part.
+    pub fn append(&mut self, part: Self) {
+        self.body.push_str(&part.body);
+    }
+
     /// Appends an empty element with attributes; values are escaped.
     pub fn element(&mut self, name: &str, attributes: &[(&str, &str)]) {
         self.start(name, attributes);

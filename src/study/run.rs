@@ -138,8 +138,13 @@ fn run_to_end(
 pub fn write_results(folder: &Path, loaded: &Loaded, finished: &Finished) -> Result<(), RunError> {
     write_json(&folder.join("summary.json"), &finished.summary)?;
     write_json(&folder.join("manifest.json"), &Manifest::of(loaded))?;
-    finished.recorder.trajectories.write(&folder.join("trajectories.csv"))?;
-    write_figure(folder, loaded, &finished.recorder.snapshots)
+    let Recorder { trajectories, snapshots, .. } = &finished.recorder;
+    let (table, figure) = rayon::join(
+        || trajectories.write(&folder.join("trajectories.csv")),
+        || write_figure(folder, loaded, snapshots),
+    );
+    table?;
+    figure
 }
 
 /// Writes `figure.svg` and `figure.png`; nothing if no time was asked for.

@@ -32,8 +32,8 @@ const ROOMS: &[Room] = &[
     Room {
         folder: "src/numerics",
         rooms: &["numerics"],
-        packages: &["nalgebra", "faer", "rstar", "rayon", "spade", "thiserror", "wide"],
-        rule: "numerics names the standard library, nalgebra, faer, rstar, rayon, spade, thiserror and itself; no ECS, no JSON, no other room",
+        packages: &["nalgebra", "faer", "rstar", "rayon", "spade", "thiserror", "pulp"],
+        rule: "numerics names the standard library, nalgebra, faer, rstar, rayon, spade, thiserror, pulp and itself; no ECS, no JSON, no other room",
     },
     Room {
         folder: "src/model",

@@ -15,6 +15,7 @@ pub mod colour;
 pub mod csv;
 mod cue_scale;
 pub mod fascicles;
+mod lettering;
 pub mod manifest;
 mod markers;
 pub mod measures;

@@ -1,13 +1,11 @@
-//! SVG figures as PNG, the same bits on every run: text is set in the embedded fonts, no font of the system is read.
+//! SVG figures as PNG, the same bits on every run: text comes as outlines, no font of the system is read.
 //!
 //! Drawings are rendered by resvg. Images inside the SVG (PNG data) are placed here, **beneath all drawings** whatever
 //! their order, so that no decoder for other picture formats is needed; such an image must not stand in a group with an
 //! opacity, a mask or a filter of its own, and must not hide a drawing.
 
-use super::theme;
 use resvg::tiny_skia::{FilterQuality, Pixmap, PixmapPaint, Transform};
 use resvg::usvg;
-use std::sync::Arc;
 
 /// Pixels of a picture at most.
 const MOST_PIXELS: f32 = 4e8;
@@ -41,14 +39,14 @@ pub fn scale_for_dpi(dpi: f32) -> f32 {
     dpi / 96.0
 }
 
-/// Renders an SVG with `scale` pixels for one px of it, on white.
+/// Renders an SVG without text elements ([`super::svg::Svg::outlined`]) with `scale` pixels for one px of it, on white.
 ///
 /// # Errors
 /// An SVG that cannot be read, a picture too large, an image in it that is no PNG.
 pub fn to_png(svg: &str, scale: f32) -> Result<Vec<u8>, PngError> {
     let to_pixels = Transform::from_scale(scale, scale);
     let images = || {
-        let tree = usvg::Tree::from_str(svg, &options())?;
+        let tree = usvg::Tree::from_str(svg, &usvg::Options::default())?;
         let mut canvas = white_canvas(tree.size(), scale)?;
         draw_images(tree.root(), to_pixels, &mut canvas)?;
         Ok::<_, PngError>(canvas)
@@ -59,20 +57,11 @@ pub fn to_png(svg: &str, scale: f32) -> Result<Vec<u8>, PngError> {
     canvas.encode_png().map_err(|error| PngError::Encode(error.to_string()))
 }
 
-/// Parser options that know the embedded fonts only.
-pub fn options() -> usvg::Options<'static> {
-    let mut fonts = usvg::fontdb::Database::new();
-    fonts.load_font_data(theme::FONT_REGULAR.to_vec());
-    fonts.load_font_data(theme::FONT_BOLD.to_vec());
-    fonts.set_sans_serif_family("DejaVu Sans");
-    usvg::Options { font_family: "DejaVu Sans".to_owned(), fontdb: Arc::new(fonts), ..usvg::Options::default() }
-}
-
 /// Parser options that leave out images.
 fn options_without_images() -> usvg::Options<'static> {
     let image_href_resolver =
         usvg::ImageHrefResolver { resolve_data: Box::new(|_, _, _| None), resolve_string: Box::new(|_, _| None) };
-    usvg::Options { image_href_resolver, ..options() }
+    usvg::Options { image_href_resolver, ..usvg::Options::default() }
 }
 
 /// A white picture for an SVG of a size in px.
@@ -117,7 +106,7 @@ fn draw_image(image: &usvg::Image, to_pixels: Transform, canvas: &mut Pixmap) ->
 mod tests {
     use super::*;
     use crate::record::svg::{Anchor, Label, Svg};
-    use crate::record::theme::Font;
+    use crate::record::theme::{self, Font};
 
     fn red_dot() -> Vec<u8> {
         let mut dot = Pixmap::new(2, 2).unwrap();
@@ -155,7 +144,7 @@ mod tests {
                 let mut svg = Svg::new(900.0, 60.0);
                 let at = [20.0, 40.0];
                 svg.label(&Label { at, anchor: Anchor::Start, font, colour: theme::TEXT, halo: false, text });
-                let tree = usvg::Tree::from_str(&svg.finish(), &options()).unwrap();
+                let tree = usvg::Tree::from_str(&svg.outlined(), &usvg::Options::default()).unwrap();
                 let drawn = tree.root().children().last().unwrap().abs_bounding_box();
                 let measured = font.width(text);
                 assert!(

@@ -3,7 +3,7 @@
 //! All panels share one scale and one frame of axes, so that the tissue is seen to stretch from panel to panel. The cues'
 //! concentrations are drawn on a logarithmic scale common to all panels, one ink an effect (see [`super::colour`]).
 //! More than [`MOST_LINES`] shafts in a panel are drawn as a density instead of lines, so that a figure of any run stays
-//! light. [`to_svg`] draws; [`super::png::to_png`] makes a picture of it.
+//! light. [`draw`] draws; [`super::png::to_png`] makes a picture of it.
 
 use super::colour::Effect;
 use super::scene_layout::Layout;
@@ -169,11 +169,11 @@ pub enum FigureError {
     Image,
 }
 
-/// Draws a figure as an SVG document: 180 mm wide from three columns on, no text below 7 pt, fonts embedded.
+/// Draws a figure: 180 mm wide from three columns on, no text below 7 pt, fonts embedded.
 ///
 /// # Errors
 /// A figure without panels or extent, positions or concentrations that are not finite or do not match the mesh.
-pub fn to_svg(figure: &SceneFigure) -> Result<String, FigureError> {
+pub fn draw(figure: &SceneFigure) -> Result<Svg, FigureError> {
     for (index, panel) in figure.panels.iter().enumerate() {
         check_panel(index, panel)?;
     }
@@ -184,17 +184,17 @@ pub fn to_svg(figure: &SceneFigure) -> Result<String, FigureError> {
     let mut svg = Svg::new(layout.width, layout.height + legend_height + theme::MARGIN);
     painter.define_gradients(&mut svg);
     layout.draw_heading(&mut svg);
-    let draw = |(index, panel): (usize, &Panel)| {
+    let draw_panel = |(index, panel): (usize, &Panel)| {
         let (mut part, cell) = (svg.part(), layout.cell(index));
         layout.draw_head(&mut part, &cell, index);
         painter.draw(&mut part, panel, index, &cell.view)?;
         layout.draw_foot(&mut part, &cell, index);
         Ok(part)
     };
-    let parts: Vec<Svg> = figure.panels.par_iter().enumerate().map(draw).collect::<Result<_, FigureError>>()?;
+    let parts: Vec<Svg> = figure.panels.par_iter().enumerate().map(draw_panel).collect::<Result<_, FigureError>>()?;
     parts.into_iter().for_each(|part| svg.append(part));
     legend.draw(&mut svg, &placed, [theme::MARGIN, layout.height]);
-    Ok(svg.finish())
+    Ok(svg)
 }
 
 fn check_panel(index: usize, panel: &Panel) -> Result<(), FigureError> {

@@ -104,7 +104,7 @@ fn text_boxes(tree: &usvg::Tree) -> Vec<usvg::tiny_skia_path::Rect> {
     fn collect(group: &usvg::Group, boxes: &mut Vec<usvg::tiny_skia_path::Rect>) {
         for node in group.children() {
             match node {
-                usvg::Node::Text(text) => boxes.push(text.abs_bounding_box()),
+                usvg::Node::Path(path) if path.id() == "text" => boxes.push(path.abs_bounding_box()),
                 usvg::Node::Group(inner) => collect(inner, boxes),
                 _ => {}
             }
@@ -116,11 +116,12 @@ fn text_boxes(tree: &usvg::Tree) -> Vec<usvg::tiny_skia_path::Rect> {
 }
 
 fn assert_well_laid(figure: &SceneFigure) -> String {
-    let svg = to_svg(figure).unwrap();
+    let drawing = draw(figure).unwrap();
+    let svg = drawing.finish();
     // Embedded data may hold any letters, but neither quotes nor spaces nor brackets.
     let wrong = ["\"NaN", " NaN", ">NaN", "\"inf", " inf"];
     assert!(!wrong.iter().any(|text| svg.contains(text)));
-    let tree = usvg::Tree::from_str(&svg, &png::options()).unwrap();
+    let tree = usvg::Tree::from_str(&drawing.outlined(), &usvg::Options::default()).unwrap();
     let boxes = text_boxes(&tree);
     for (index, one) in boxes.iter().enumerate() {
         let inside = one.left() >= 0.0 && one.top() >= 0.0;
@@ -169,29 +170,29 @@ fn titles_with_signs_special_to_xml_are_shown() {
 
 #[test]
 fn a_figure_of_500_axons_is_below_one_and_a_half_megabytes() {
-    let svg = to_svg(&three_panels(Synthetic { shafts: 500, ..USUAL })).unwrap();
+    let svg = draw(&three_panels(Synthetic { shafts: 500, ..USUAL })).unwrap().finish();
     assert!(svg.len() < 1_500_000, "{} bytes", svg.len());
 }
 
 #[test]
 fn many_shafts_become_a_density_of_bounded_size() {
-    let svg = to_svg(&three_panels(Synthetic { shafts: MOST_LINES + 1, ..USUAL })).unwrap();
+    let svg = draw(&three_panels(Synthetic { shafts: MOST_LINES + 1, ..USUAL })).unwrap().finish();
     assert!(svg.contains("axons at a point") && svg.len() < 1_500_000, "{} bytes", svg.len());
 }
 
 #[test]
 fn the_same_figure_gives_the_same_bytes() {
     let figure = SceneFigure::new("", "", vec![synthetic_panel("t = 0 h", Synthetic { shafts: 9, ..USUAL })]);
-    let (one, other) = (to_svg(&figure).unwrap(), to_svg(&figure).unwrap());
+    let (one, other) = (draw(&figure).unwrap(), draw(&figure).unwrap());
     assert_eq!(one, other);
-    assert_eq!(png::to_png(&one, 1.0).unwrap(), png::to_png(&other, 1.0).unwrap());
+    assert_eq!(png::to_png(&one.outlined(), 1.0).unwrap(), png::to_png(&other.outlined(), 1.0).unwrap());
 }
 
 #[test]
 fn the_field_is_purple_at_the_attractant_and_blue_at_a_repellent() {
     let figure = SceneFigure::new("", "", vec![synthetic_panel("x", Synthetic { shafts: 0, stretch: 1.0, ..USUAL })]);
     let layout = Layout::of(&figure).unwrap();
-    let picture = png::to_png(&to_svg(&figure).unwrap(), 1.0).unwrap();
+    let picture = png::to_png(&draw(&figure).unwrap().outlined(), 1.0).unwrap();
     let picture = resvg::tiny_skia::Pixmap::decode_png(&picture).unwrap();
     let view = layout.cell(0).view;
     let colour = |x: f64, y: f64| {
@@ -210,10 +211,10 @@ fn data_that_do_not_fit_are_refused_by_name() {
     let refuse = |change: &dyn Fn(&mut Panel)| {
         let mut bad = good.clone();
         change(&mut bad);
-        to_svg(&SceneFigure::new("", "", vec![good.clone(), bad])).unwrap_err()
+        draw(&SceneFigure::new("", "", vec![good.clone(), bad])).unwrap_err()
     };
     let count = good.vertices.len();
-    assert_eq!(to_svg(&SceneFigure::new("", "", vec![])), Err(FigureError::NoPanel));
+    assert_eq!(draw(&SceneFigure::new("", "", vec![])), Err(FigureError::NoPanel));
     assert_eq!(refuse(&|p| p.shafts[0][3][0] = f64::NAN), FigureError::NotFinite { panel: 1, what: "shafts" });
     assert_eq!(
         refuse(&|p| p.cells[5] = 99_999),
@@ -222,6 +223,6 @@ fn data_that_do_not_fit_are_refused_by_name() {
     let cue = "slit".to_owned();
     let short = refuse(&|p| p.cues[1].concentration.truncate(count - 1));
     assert_eq!(short, FigureError::Concentration { panel: 1, cue, found: count - 1, expected: count });
-    let empty = to_svg(&SceneFigure::new("", "", vec![Panel::default()]));
+    let empty = draw(&SceneFigure::new("", "", vec![Panel::default()]));
     assert!(matches!(empty, Err(FigureError::NoExtent { .. })));
 }

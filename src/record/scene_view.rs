@@ -1,8 +1,9 @@
 //! Snapshots as panels of a figure.
 
 use super::colour;
-use super::scene_figure::{BorderLine, CueLayer, FigureError, Panel, SceneFigure, Tip, TipStatus, to_svg};
+use super::scene_figure::{BorderLine, CueLayer, FigureError, Panel, SceneFigure, Tip, TipStatus, draw};
 use super::snapshot::{FieldView, Snapshot, TipView};
+use super::svg::Svg;
 use crate::model::components::Status;
 use crate::model::observables::Effect;
 
@@ -10,10 +11,10 @@ use crate::model::observables::Effect;
 ///
 /// # Errors
 /// No snapshot, or data that are not finite.
-pub fn scene_svg(title: &str, subtitle: &str, snapshots: &[Snapshot]) -> Result<String, FigureError> {
+pub fn scene_figure(title: &str, subtitle: &str, snapshots: &[Snapshot]) -> Result<Svg, FigureError> {
     let panels =
         snapshots.iter().map(|snapshot| panel(format!("t = {} h", rounded(snapshot.time)), snapshot)).collect();
-    to_svg(&SceneFigure::new(title, subtitle, panels))
+    draw(&SceneFigure::new(title, subtitle, panels))
 }
 
 /// One snapshot as a panel with a label. Cues that nothing turns by are left out.

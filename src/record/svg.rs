@@ -1,5 +1,6 @@
 //! A small SVG writer: elements, escaped text, compact paths.
 
+use super::lettering::outline;
 use super::theme::{self, Font};
 use std::fmt::Write;
 
@@ -9,6 +10,19 @@ pub struct Svg {
     width: f64,
     height: f64,
     body: String,
+    /// Text is kept apart, each line with its place in the body: files carry it as text, pictures as outlines.
+    lines: Vec<(usize, Line)>,
+}
+
+/// A line of text to be written.
+#[derive(Debug, Clone, PartialEq)]
+struct Line {
+    at: [f64; 2],
+    anchor: Anchor,
+    font: Font,
+    colour: [u8; 3],
+    halo: bool,
+    text: String,
 }
 
 /// Where a line of text hangs on its point.
@@ -42,7 +56,7 @@ pub struct Label<'a> {
 impl Svg {
     /// An empty document of a size in px.
     pub fn new(width: f64, height: f64) -> Self {
-        Self { width, height, body: String::new() }
+        Self { width, height, body: String::new(), lines: Vec::new() }
     }
 
     /// A drawing to be appended to this one.
@@ -52,7 +66,9 @@ impl Svg {
 
     /// Appends what was drawn on a part.
     pub fn append(&mut self, part: Self) {
+        let before = self.body.len();
         self.body.push_str(&part.body);
+        self.lines.extend(part.lines.into_iter().map(|(place, line)| (before + place, line)));
     }
 
     /// Appends an empty element with attributes; values are escaped.
@@ -112,59 +128,103 @@ impl Svg {
 
     /// Appends a line of text.
     pub fn label(&mut self, label: &Label) {
-        let [x, y] = label.at.map(number);
-        let (size, fill) = (number(label.font.size), super::colour::hexadecimal(label.colour));
-        let anchor = match label.anchor {
-            Anchor::Start => "start",
-            Anchor::Middle => "middle",
-            Anchor::End => "end",
-        };
-        let mut attributes = vec![("x", x.as_str()), ("y", &y), ("font-size", &size), ("fill", &fill)];
-        attributes.push(("text-anchor", anchor));
-        if label.font.bold {
-            attributes.push(("font-weight", "bold"));
-        }
-        if label.halo {
-            attributes.extend([("stroke", "#ffffff"), ("stroke-width", "2.5"), ("stroke-opacity", "0.85")]);
-            attributes.extend([("stroke-linejoin", "round"), ("paint-order", "stroke")]);
-        }
-        self.start("text", &attributes);
-        self.body.push('>');
-        escape(&mut self.body, label.text);
-        self.body.push_str("</text>\n");
+        let Label { at, anchor, font, colour, halo, text } = *label;
+        let line = Line { at, anchor, font, colour, halo, text: text.to_owned() };
+        self.lines.push((self.body.len(), line));
     }
 
     /// The whole document, with the fonts inside so that it looks the same on every machine.
-    pub fn finish(self) -> String {
-        let (width, height) = (number(self.width), number(self.height));
+    pub fn finish(&self) -> String {
         let face = |weight: &str, data: &[u8]| {
             format!(
                 "@font-face{{font-family:'DejaVu Sans';font-weight:{weight};src:url(data:font/woff2;base64,{}) format('woff2')}}\n",
                 base64(data)
             )
         };
-        format!(
-            "<svg xmlns=\"http://www.w3.org/2000/svg\" xmlns:xlink=\"http://www.w3.org/1999/xlink\" width=\"{width}\" \
-             height=\"{height}\" viewBox=\"0 0 {width} {height}\" font-family=\"{}\" \
-             style=\"background:#ffffff\">\n<style>\n{}{}</style>\n{}</svg>\n",
-            theme::FONT_FAMILY,
-            face("normal", theme::WEB_FONT_REGULAR),
-            face("bold", theme::WEB_FONT_BOLD),
-            self.body
-        )
+        let faces = [face("normal", theme::WEB_FONT_REGULAR), face("bold", theme::WEB_FONT_BOLD)].concat();
+        self.document(&format!("<style>\n{faces}</style>\n"), write_text)
     }
 
-    /// Writes the beginning of an element, without its closing bracket.
-    fn start(&mut self, name: &str, attributes: &[(&str, &str)]) {
-        self.body.push('<');
-        self.body.push_str(name);
-        for (key, value) in attributes {
-            self.body.push(' ');
-            self.body.push_str(key);
-            self.body.push_str("=\"");
-            escape(&mut self.body, value);
-            self.body.push('"');
+    /// The whole document with its text as outlines, for a renderer that knows no fonts.
+    pub fn outlined(&self) -> String {
+        self.document("", write_outline)
+    }
+
+    fn document(&self, head: &str, write: fn(&mut String, &Line)) -> String {
+        let (width, height) = (number(self.width), number(self.height));
+        let mut text = format!(
+            "<svg xmlns=\"http://www.w3.org/2000/svg\" xmlns:xlink=\"http://www.w3.org/1999/xlink\" width=\"{width}\" \
+             height=\"{height}\" viewBox=\"0 0 {width} {height}\" font-family=\"{}\" \
+             style=\"background:#ffffff\">\n{head}",
+            theme::FONT_FAMILY,
+        );
+        let mut written = 0;
+        for (place, line) in &self.lines {
+            text.push_str(&self.body[written..*place]);
+            write(&mut text, line);
+            written = *place;
         }
+        text.push_str(&self.body[written..]);
+        text.push_str("</svg>\n");
+        text
+    }
+
+    fn start(&mut self, name: &str, attributes: &[(&str, &str)]) {
+        start(&mut self.body, name, attributes);
+    }
+}
+
+const HALO: [(&str, &str); 5] = [
+    ("stroke", "#ffffff"),
+    ("stroke-width", "2.5"),
+    ("stroke-opacity", "0.85"),
+    ("stroke-linejoin", "round"),
+    ("paint-order", "stroke"),
+];
+
+fn write_text(target: &mut String, line: &Line) {
+    let Line { at, anchor, font, colour, halo, text } = line;
+    let ([x, y], size, fill) = (at.map(number), number(font.size), super::colour::hexadecimal(*colour));
+    let anchor = match anchor {
+        Anchor::Start => "start",
+        Anchor::Middle => "middle",
+        Anchor::End => "end",
+    };
+    let mut attributes = vec![("x", x.as_str()), ("y", &y), ("font-size", &size), ("fill", &fill)];
+    attributes.push(("text-anchor", anchor));
+    if font.bold {
+        attributes.push(("font-weight", "bold"));
+    }
+    if *halo {
+        attributes.extend(HALO);
+    }
+    start(target, "text", &attributes);
+    target.push('>');
+    escape(target, text);
+    target.push_str("</text>\n");
+}
+
+fn write_outline(target: &mut String, line: &Line) {
+    let Line { at, anchor, font, colour, halo, text } = line;
+    let (data, fill) = (outline(text, font, *at, *anchor), super::colour::hexadecimal(*colour));
+    let mut attributes = vec![("id", "text"), ("d", data.as_str()), ("fill", &fill)];
+    if *halo {
+        attributes.extend(HALO);
+    }
+    start(target, "path", &attributes);
+    target.push_str("/>\n");
+}
+
+/// Writes the beginning of an element, without its closing bracket.
+fn start(target: &mut String, name: &str, attributes: &[(&str, &str)]) {
+    target.push('<');
+    target.push_str(name);
+    for (key, value) in attributes {
+        target.push(' ');
+        target.push_str(key);
+        target.push_str("=\"");
+        escape(target, value);
+        target.push('"');
     }
 }
 

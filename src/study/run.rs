@@ -9,7 +9,7 @@ use crate::record::output::{WriteError, write_atomically};
 use crate::record::png::{PngError, scale_for_dpi, to_png};
 use crate::record::recorder::{Recorder, RecorderOptions};
 use crate::record::scene_figure::FigureError;
-use crate::record::scene_view::scene_svg;
+use crate::record::scene_view::scene_figure;
 use crate::record::snapshot::Snapshot;
 use crate::record::summary::{Summary, SummaryOptions};
 use crate::scenario::load::{Loaded, Request, ScenarioErrors, load};
@@ -155,9 +155,9 @@ pub fn write_figure(folder: &Path, loaded: &Loaded, snapshots: &[Snapshot]) -> R
     if snapshots.is_empty() {
         return Ok(());
     }
-    let svg = scene_svg(&loaded.scene.name, &loaded.scene.description, snapshots)?;
-    write_atomically(&folder.join("figure.svg"), svg.as_bytes())?;
-    write_atomically(&folder.join("figure.png"), &to_png(&svg, scale_for_dpi(DPI))?)?;
+    let figure = scene_figure(&loaded.scene.name, &loaded.scene.description, snapshots)?;
+    write_atomically(&folder.join("figure.svg"), figure.finish().as_bytes())?;
+    write_atomically(&folder.join("figure.png"), &to_png(&figure.outlined(), scale_for_dpi(DPI))?)?;
     Ok(())
 }
 

@@ -6,9 +6,10 @@ use crate::model::mechanism::Roster;
 use crate::record::manifest::Manifest;
 use crate::record::output::prepare_folder;
 use crate::scenario::load::{Loaded, Request};
+use crate::study::plan::plan;
 use crate::study::run::{RunError, folder_of, read, simulate, write_figure, write_json, write_results};
 use crate::study::seeds::{over_seeds, summarise};
-use clap::Parser;
+use clap::{Args, Parser, Subcommand};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::ffi::OsString;
 use std::path::PathBuf;
@@ -16,16 +17,13 @@ use std::process::ExitCode;
 
 /// Simulates how axons find their way: runs a scenario and writes its results into out/<scene>/.
 #[derive(Debug, Parser)]
-#[command(name = "tropism", version, after_help = EXAMPLES)]
+#[command(name = "tropism", version, after_help = EXAMPLES, args_conflicts_with_subcommands = true)]
+#[command(subcommand_negates_reqs = true)]
 struct Cli {
-    /// The scenario, a JSON file
-    scenario: PathBuf,
-    /// Leave a mechanism out, as if the scenario had no such block (repeatable)
-    #[arg(long, value_name = "NAME")]
-    without: Vec<String>,
-    /// Set one key, named by its JSON pointer (repeatable)
-    #[arg(long, value_name = "/POINTER=VALUE")]
-    set: Vec<String>,
+    #[command(subcommand)]
+    command: Option<Command>,
+    #[command(flatten)]
+    scene: SceneArguments,
     /// Folder of the results [default: out/<scene>]
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
@@ -37,11 +35,53 @@ struct Cli {
     threads: Option<u32>,
 }
 
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Says what a scene needs and what it does not, and how near its limits are; takes no step
+    Plan {
+        #[command(flatten)]
+        scene: SceneArguments,
+        /// Print the plan as JSON
+        #[arg(long)]
+        json: bool,
+    },
+}
+
+/// A scenario and what is changed in it.
+#[derive(Debug, Args)]
+struct SceneArguments {
+    /// The scenario, a JSON file
+    #[arg(required = true)]
+    scenario: Option<PathBuf>,
+    /// Leave a mechanism out, as if the scenario had no such block (repeatable)
+    #[arg(long, value_name = "NAME")]
+    without: Vec<String>,
+    /// Set one key, named by its JSON pointer (repeatable)
+    #[arg(long, value_name = "/POINTER=VALUE")]
+    set: Vec<String>,
+}
+
+impl SceneArguments {
+    fn path(&self) -> PathBuf {
+        self.scenario.clone().unwrap_or_default()
+    }
+
+    fn load(&self, roster: &Roster) -> Result<Loaded, RunError> {
+        let request = Request { path: self.path(), without: self.without.clone(), set: self.set.clone() };
+        let loaded = read(&request, roster)?;
+        for hint in &loaded.hints {
+            eprintln!("hint: {hint}");
+        }
+        Ok(loaded)
+    }
+}
+
 const EXAMPLES: &str = "Examples:
   tropism scenarios/olfactory.json                       the complete model
   tropism scenarios/olfactory.json --without chemotaxis  an ablation
   tropism scenarios/olfactory.json --set /seed=7 --set /populations/olfactory/count=50
-  tropism scenarios/olfactory.json --seeds 20 --out out/olfactory-20";
+  tropism scenarios/olfactory.json --seeds 20 --out out/olfactory-20
+  tropism plan scenarios/olfactory.json                  what it needs, before it runs";
 
 /// Runs the program with a roster of mechanisms: the whole of `main`, also for programs that add their own.
 pub fn run(arguments: impl IntoIterator<Item = impl Into<OsString> + Clone>, roster: Roster) -> ExitCode {
@@ -72,11 +112,10 @@ fn on_threads<T: Send>(cli: &Cli, work: impl FnOnce() -> Result<T, RunError> + S
 }
 
 fn execute(cli: &Cli, roster: &Roster) -> Result<ExitCode, RunError> {
-    let request = Request { path: cli.scenario.clone(), without: cli.without.clone(), set: cli.set.clone() };
-    let loaded = read(&request, roster)?;
-    for hint in &loaded.hints {
-        eprintln!("hint: {hint}");
+    if let Some(Command::Plan { scene, json }) = &cli.command {
+        return run_plan(scene, *json, roster);
     }
+    let loaded = cli.scene.load(roster)?;
     let folder = folder_of(cli.out.as_ref(), &loaded.scene.name);
     prepare_folder(&folder)?;
     let complete = match cli.seeds {
@@ -87,9 +126,22 @@ fn execute(cli: &Cli, roster: &Roster) -> Result<ExitCode, RunError> {
     Ok(ExitCode::from(u8::from(!complete)))
 }
 
+fn run_plan(scene: &SceneArguments, json: bool, roster: &Roster) -> Result<ExitCode, RunError> {
+    let found = plan(&scene.load(roster)?, roster, &scene.path())?;
+    if json {
+        let text = serde_json::to_string_pretty(&found).map_err(|error| RunError::Internal(error.to_string()))?;
+        println!("{text}");
+    } else {
+        print!("{found}");
+        found.notes.iter().for_each(|note| eprintln!("note: {note}"));
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
 fn run_once(cli: &Cli, roster: &Roster, loaded: &Loaded, folder: &std::path::Path) -> Result<bool, RunError> {
     let bar = progress_bar();
-    let finished = simulate(loaded, roster, &cli.scenario, true, |share| bar.set_position((share * 1000.0) as u64))?;
+    let finished =
+        simulate(loaded, roster, &cli.scene.path(), true, |share| bar.set_position((share * 1000.0) as u64))?;
     bar.finish_and_clear();
     write_results(folder, loaded, &finished)?;
     let summary = &finished.summary;
@@ -125,7 +177,7 @@ fn run_seeds(
     count: u64,
 ) -> Result<bool, RunError> {
     let bar = progress_bar();
-    let runs = over_seeds(loaded, roster, &cli.scenario, count, |share| bar.set_position((share * 1000.0) as u64))?;
+    let runs = over_seeds(loaded, roster, &cli.scene.path(), count, |share| bar.set_position((share * 1000.0) as u64))?;
     bar.finish_and_clear();
     let summary = summarise(loaded, &runs)?;
     write_json(&folder.join("summary.json"), &summary)?;

@@ -25,6 +25,15 @@ impl Mechanism for Borders {
     const NAME: &'static str = "borders";
 
     fn install(self, model: &mut ModelBuilder) -> Result<(), InstallError> {
+        let turning_rate = model.world.resource::<Growth>().turning_rate;
+        let fastest = model.world.resource::<Populations>().0.iter().map(|p| p.speed).fold(0.0, f64::max);
+        let angle = escape_angle(turning_rate, self.weight.0, self.range.0, fastest).to_degrees();
+        model.plan().keep(
+            "borders",
+            format!("cones that come within {angle:.1} deg of a border's normal reach it; then `on_border` decides"),
+        );
+        // Two edges at a corner.
+        model.pulls_up_to(2.0 * self.weight.0);
         model.insert(EdgeBoxes::default()).insert_law(self);
         model.term(Term::Contact, (bound_edges, repel).chain());
         Ok(())

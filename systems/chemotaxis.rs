@@ -146,8 +146,12 @@ impl Mechanism for Chemotaxis {
         model.attach(move |cone| ReceptorWeights(initial[cone.population as usize].clone()));
         let changing = self.receptors.values().any(|r| r.availability.is_some() || !r.silenced_by.is_empty());
         if changing {
+            model.plan().keep("receptor weights over time", "availability or silencing changes them");
             model.term(Term::Weigh, weigh);
+        } else {
+            model.plan().leave_out("receptor weights over time", "no receptor has an availability or is silenced");
         }
+        model.pulls_up_to(1.0);
         model.insert_law(self).term(Term::Sample, sample).at_end(bind_receptors);
         Ok(())
     }
@@ -237,7 +241,6 @@ fn bind_receptors(world: &mut World) -> Result<(), InstallError> {
 
 /// λ_i(t) of every cone.
 fn weigh(
-    law: Res<Law<Chemotaxis>>,
     receptors: Res<Receptors>,
     populations: Res<Populations>,
     (tissue, fields, stage): (Res<Tissue>, Res<CueFields>, Res<StageTime>),
@@ -264,7 +267,6 @@ fn weigh(
                 .product();
             *weight = receptor.weight.0 * available * unsilenced;
         }
-        debug_assert_eq!(weights.0.len(), law.receptors.len());
     });
 }
 

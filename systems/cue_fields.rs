@@ -185,6 +185,9 @@ fn solve_demanded(world: &mut World) -> Result<(), InstallError> {
     let cues = world.resource::<Law<Cues>>().0.0.clone();
     let demanded = world.resource::<Demands>().of(Cues::NAME);
     let mesh = Arc::clone(&world.resource::<Tissue>().mesh);
+    for name in cues.keys().filter(|name| !demanded.contains(name)) {
+        world.resource_mut::<Plan>().leave_out(format!("cue `{name}`"), "no mechanism reads it");
+    }
     if demanded.iter().any(|name| cues.contains_key(name)) {
         let recovery = GradientRecovery::new(&mesh);
         let regions: Vec<Vec<u32>> = world.resource::<Tissue>().regions.values().cloned().collect();
@@ -198,6 +201,10 @@ fn solve_demanded(world: &mut World) -> Result<(), InstallError> {
             let index = fields.names.len();
             let observable = Observable { name: name.clone(), index, read: read_concentration };
             world.resource_mut::<Observables>().fields.push(observable);
+            let levels = path.levels().len();
+            let times = if levels == 1 { "once".to_owned() } else { format!("at {levels} load levels") };
+            let why = format!("read; {} unknowns, solved {times}", mesh.vertex_count());
+            world.resource_mut::<Plan>().keep(format!("cue `{name}`"), why);
             fields.add(name.clone(), path);
         }
         let work = solver.work();

@@ -61,17 +61,22 @@ impl Mechanism for Fasciculation {
     fn install(self, model: &mut ModelBuilder) -> Result<(), InstallError> {
         let populations = &model.world.resource::<Populations>().0;
         if populations.iter().map(|population| population.count).sum::<usize>() < 2 {
+            model.plan().leave_out("shaft index", "an axon alone has no neighbours");
             return Ok(());
         }
         let table = AdhesionTable::new(&self.adhesion, populations);
         let fastest = populations.iter().map(|population| population.speed).fold(0.0, f64::max);
         let clock = model.world.resource::<Clock>();
         let (step, bound) = (clock.grid.hours(clock.grid.step_ticks()), self.reach.0 / (5.0 * fastest));
-        if step > bound {
-            let text =
-                format!("fasciculation: a step of {step:.4} h is long for contact; {bound:.4} h or less is advised");
-            model.world.resource_mut::<Health>().note(text);
-        }
+        let mut plan = model.plan();
+        plan.compare(
+            "fasciculation: step (h) against a fifth of the reach over the speed",
+            step,
+            bound,
+            "a shorter step",
+        );
+        plan.keep("shaft index", format!("fasciculation feels shafts within {} um", self.reach.0));
+        model.pulls_up_to(self.weight.0);
         ShaftIndex::install(model, self.reach.0);
         model.insert(table).insert_law(self).term(Term::Contact, attract);
         Ok(())

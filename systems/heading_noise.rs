@@ -21,6 +21,7 @@ impl Mechanism for HeadingNoise {
     fn install(self, model: &mut ModelBuilder) -> Result<(), InstallError> {
         let tick = model.world.resource::<Clock>().grid.tick();
         let paths = BrownianTree::new(model.seed(), model.stream(), tick);
+        model.plan().keep("Brownian paths", "headings diffuse");
         model.insert(HeadingPaths(paths)).insert_law(self).term(Term::Turn, diffuse);
         Ok(())
     }

@@ -82,6 +82,14 @@ impl Matrix {
         ["top", "bottom"].map(|name| (name.to_owned(), outward.clone())).into()
     }
 
+    /// Whether any edge moves at any time.
+    fn moves(&self) -> bool {
+        let moved = |motion: &EdgeMotion| motion.outward.0 != 0.0 || motion.shift.iter().any(|shift| shift.0 != 0.0);
+        let LoadCurve { times, loads } = &self.load;
+        let loaded = times.is_empty() || loads.iter().any(|load| load.0 != 0.0);
+        loaded && self.edges().values().any(moved)
+    }
+
     fn law(&self) -> Result<Arc<dyn Material<2>>, InstallError> {
         let lame = Lame::from_young_poisson(self.young_modulus.0, self.poisson_ratio.0).map_err(solve_error)?;
         Ok(match self.material {
@@ -141,6 +149,10 @@ impl Mechanism for Matrix {
     }
 
     fn install(self, model: &mut ModelBuilder) -> Result<(), InstallError> {
+        if !self.moves() {
+            model.plan().leave_out("matrix", "no edge moves: the tissue stays at rest");
+            return Ok(());
+        }
         let tissue = model.world.resource::<Tissue>();
         let prescribed = self.prescribed(tissue)?;
         let body = Body::new(&tissue.mesh, self.law()?, prescribed).map_err(solve_error)?;
@@ -150,6 +162,15 @@ impl Mechanism for Matrix {
         })?;
         let duration = model.world.resource::<Clock>().grid.hours(model.world.resource::<Clock>().end);
         record(model.world, &path);
+        let edges: Vec<String> = self.edges().into_keys().collect();
+        let (unknowns, report) = (2 * model.world.resource::<Tissue>().mesh.vertex_count(), path.report());
+        let why = format!(
+            "edges {} are moved: {unknowns} unknowns, {} load levels, {} equilibria",
+            edges.join(", "),
+            report.levels,
+            report.solves
+        );
+        model.plan().keep("matrix", why);
         model.insert(Loading { path, curve: self.load.clone(), duration }).insert_law(self);
         model.motion(follow_load);
         Ok(())

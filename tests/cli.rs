@@ -77,6 +77,23 @@ fn a_run_leaves_its_five_files_and_ends_with_zero() {
 }
 
 #[test]
+fn a_plan_is_printed_and_leaves_nothing_behind() {
+    let folder = with_scene(&scene());
+    let output = tropism(&folder, &["plan", "scene.json", "--without", "matrix"]);
+    assert_eq!(code(&output), 0, "{}", errors(&output));
+    let words = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert!(
+        words.contains("does not need\n") && words.contains("matrix                      the scene has no such block")
+    );
+    assert!(!folder.0.join("out").exists());
+    let output = tropism(&folder, &["plan", "scene.json", "--json", "--set", "/populations/axons/count=1"]);
+    let plan: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(plan["steps"], json!(60));
+    assert_eq!(code(&tropism(&folder, &["plan", "scene.json", "--set", "/seed=-1"])), 2);
+    assert_eq!(code(&tropism(&folder, &["plan"])), 2);
+}
+
+#[test]
 fn the_summary_is_complete() {
     let folder = with_scene(&scene());
     assert_eq!(code(&tropism(&folder, &["scene.json", "--out", "results"])), 0);

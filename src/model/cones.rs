@@ -41,27 +41,25 @@ pub struct Cones<'w, 's> {
 }
 
 impl Cones<'_, '_> {
-    /// Calls `act` for every growing cone, in parallel; returns how many there were. `act` reads the cone and writes its
-    /// own spring state, so the result does not depend on the number of threads.
-    pub fn for_each(&mut self, act: impl Fn(Cone, &mut SpringState) + Sync) -> u64 {
-        let Ok(tables) = self.query.contiguous_iter_mut() else { return 0 };
-        let (mut first, mut growing) = (0, 0);
+    /// Calls `act` for every growing cone, in parallel. `act` reads the cone and writes its own spring state, so the result does not
+    /// depend on the number of threads.
+    pub fn for_each(&mut self, act: impl Fn(Cone, &mut SpringState) + Sync) {
+        let Ok(tables) = self.query.contiguous_iter_mut() else { return };
+        let mut first = 0;
         for (identities, statuses, sites, positions, receptors, mut springs) in tables {
             let springs = springs.bypass_change_detection();
             let count = springs.len();
-            growing += (identities, statuses, sites, positions, receptors, springs)
+            (identities, statuses, sites, positions, receptors, springs)
                 .into_par_iter()
                 .with_min_len(CHUNK)
                 .enumerate()
                 .filter(|(_, (_, status, ..))| **status == Status::Growing)
-                .map(|(i, (identity, _, site, position, receptors, spring))| {
+                .for_each(|(i, (identity, _, site, position, receptors, spring))| {
                     let index = first + i;
                     act(Cone { index, identity, site: *site, position: position.0, receptors: &receptors.0 }, spring);
-                })
-                .count() as u64;
+                });
             first += count;
         }
-        growing
     }
 
     /// What `look` sees of each growing cone, in their order.

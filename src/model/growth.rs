@@ -17,6 +17,17 @@ pub enum Method {
     Rk4,
 }
 
+impl Method {
+    /// The largest κΔt|L̂| for which the method damps what the turning law damps; none for a method that always does.
+    pub fn stability_limit(self) -> Option<f64> {
+        match self {
+            Self::Rotation => None,
+            Self::Euler | Self::Heun => Some(2.0),
+            Self::Rk4 => Some(2.785),
+        }
+    }
+}
+
 /// What a step that would leave the tissue does, decided at the crossing point.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum OnBorder {

@@ -1,6 +1,7 @@
 //! What went wrong while running, and what was done how often.
 
 use bevy_ecs::prelude::Resource;
+use serde::Serialize;
 use std::fmt;
 
 /// A fault that ends the run at this step: what, where, how much.
@@ -53,9 +54,9 @@ impl Health {
 }
 
 /// How often each costly thing was done.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Resource)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Resource, Serialize)]
 pub struct Counters {
-    /// Steps Δt.
+    /// Steps Δt in which something grew.
     pub steps: u64,
     /// Steps of growing cones.
     pub cone_steps: u64,

@@ -6,6 +6,7 @@
 
 use super::components::GrowthCone;
 use super::health::Health;
+use super::plan::Plan;
 use super::random::Stream;
 use super::schedule::{Motion, Phase, Schedules, Slot, Term};
 use super::violation::{Violation, Violations};
@@ -130,6 +131,7 @@ impl<'a> ModelBuilder<'a> {
     pub(crate) fn new(world: &'a mut World, schedules: &'a mut Schedules, seed: u64) -> Self {
         world.init_resource::<Demands>();
         world.init_resource::<Health>();
+        world.init_resource::<Plan>();
         Self { world, schedules, slot: 0, name: "", seed, finishers: Vec::new(), attachers: Vec::new() }
     }
 
@@ -196,6 +198,17 @@ impl<'a> ModelBuilder<'a> {
     pub fn demand(&mut self, provider: &str, key: &str) -> &mut Self {
         let mut demands = self.world.resource_mut::<Demands>();
         demands.0.entry(provider.to_owned()).or_default().insert(key.to_owned());
+        self
+    }
+
+    /// The plan of the scene, to say what is kept or left out, and how near limits are.
+    pub fn plan(&mut self) -> bevy_ecs::prelude::Mut<'_, Plan> {
+        self.world.resource_mut::<Plan>()
+    }
+
+    /// Says how strong a pull |L̂| the mechanism adds at most; the plan judges explicit methods by the sum.
+    pub fn pulls_up_to(&mut self, strongest: f64) -> &mut Self {
+        self.plan().strongest_pull += strongest;
         self
     }
 

@@ -12,6 +12,7 @@ pub mod integrator;
 pub mod keys;
 pub mod mechanism;
 pub mod observables;
+pub mod plan;
 pub mod quantity;
 mod quantity_macro;
 pub mod random;

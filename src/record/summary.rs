@@ -6,6 +6,7 @@ use crate::model::clock::Clock;
 use crate::model::components::{GrowthCone, Journey, Status};
 use crate::model::growth::{Growth, Populations, Targets};
 use crate::model::health::{Counters, Fault, Health};
+use crate::model::plan::Plan;
 use crate::model::shafts::Shafts;
 use crate::model::stopwatch::Stopwatch;
 use crate::model::tissue::{Configuration, Tissue};
@@ -47,24 +48,9 @@ pub struct DerivedConstants {
 /// What a run cost.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Cost {
-    /// Steps Δt in which something grew.
-    pub steps: u64,
-    /// Steps of growing cones.
-    pub cone_steps: u64,
-    /// Evaluations of the right-hand side.
-    pub stages: u64,
-    /// Linear solves for cue fields.
-    pub cue_solves: u64,
-    /// Factorisations for cue fields.
-    pub cue_factorisations: u64,
-    /// Equilibria of the matrix.
-    pub matrix_solves: u64,
-    /// Newton iterations for them.
-    pub newton_iterations: u64,
-    /// Queries of the neighbour index.
-    pub neighbour_queries: u64,
-    /// Segments in the neighbour index.
-    pub indexed_segments: u64,
+    /// How often each costly thing was done.
+    #[serde(flatten)]
+    pub counters: Counters,
     /// Vertices of the mesh.
     pub mesh_vertices: usize,
     /// Vertices stored for all shafts.
@@ -98,6 +84,8 @@ pub struct Summary {
     pub speed_drift: f64,
     /// Derived constants of eq. (1), by population.
     pub derived: BTreeMap<String, DerivedConstants>,
+    /// What the scene needed and what it did not, and how near its limits were.
+    pub plan: Plan,
     /// What the user should know of.
     pub notes: Vec<String>,
     /// What it cost.
@@ -133,6 +121,7 @@ impl Summary {
             morphology: morphology(world, &measures),
             speed_drift: speed_drift(world),
             derived: constants(world),
+            plan: world.resource::<Plan>().clone(),
             notes: world.resource::<Health>().notes().to_vec(),
             cost: cost(world),
         }
@@ -171,7 +160,8 @@ fn speed_drift(world: &World) -> f64 {
     cones.iter(world).map(|journey| journey.worst_drift).fold(0.0, f64::max)
 }
 
-fn constants(world: &World) -> BTreeMap<String, DerivedConstants> {
+/// Derived constants of eq. (1), by population.
+pub fn constants(world: &World) -> BTreeMap<String, DerivedConstants> {
     let growth = world.resource::<Growth>();
     let of = |speed: f64| {
         let found = derived(growth.turning_rate, growth.filopodium_length, speed, growth.filopodia_time);
@@ -186,29 +176,10 @@ fn constants(world: &World) -> BTreeMap<String, DerivedConstants> {
 }
 
 fn cost(world: &World) -> Cost {
-    let Counters {
-        steps,
-        cone_steps,
-        stages,
-        cue_solves,
-        cue_factorisations,
-        matrix_solves,
-        newton_iterations,
-        neighbour_queries,
-        indexed_segments,
-    } = *world.resource::<Counters>();
     let seconds = world.resource::<Stopwatch>().seconds().clone();
     let total: f64 = seconds.values().sum::<f64>().max(f64::MIN_POSITIVE);
     Cost {
-        steps,
-        cone_steps,
-        stages,
-        cue_solves,
-        cue_factorisations,
-        matrix_solves,
-        newton_iterations,
-        neighbour_queries,
-        indexed_segments,
+        counters: *world.resource::<Counters>(),
         mesh_vertices: world.resource::<Tissue>().mesh.vertex_count(),
         shaft_vertices: world.resource::<Shafts>().vertex_count(),
         share: seconds.iter().map(|(phase, s)| (*phase, s / total)).collect(),

@@ -9,6 +9,7 @@ use crate::model::health::{Counters, Health};
 use crate::model::integrator::{advance, bring_tissue_to};
 use crate::model::mechanism::{InstallError, Installable, ModelBuilder, Roster};
 use crate::model::observables::Observables;
+use crate::model::plan::Plan;
 use crate::model::schedule::{MotionSchedule, Phase, RightHandSide, Schedules, Term};
 use crate::model::settle::settle;
 use crate::model::shape::{Shape, coordinates};
@@ -64,7 +65,7 @@ pub(super) fn assemble(loaded: &Loaded, roster: &Roster) -> Result<Simulation, A
     let mut schedules = Schedules::new();
     install(&mut world, &mut schedules, chosen, scene.seed, &cones)?;
     add_core_systems(&world, &mut schedules);
-    note_fast_springs(&mut world);
+    plan(&mut world, loaded, roster);
     schedules.initialize(&mut world).map_err(AssemblyError::Solve)?;
     world.insert_resource(MotionSchedule(schedules.motion));
     world.insert_resource(RightHandSide(schedules.right_hand_side));
@@ -206,18 +207,37 @@ fn refused(name: &str, error: InstallError) -> AssemblyError {
     }
 }
 
-/// Eq. (1) is derived for ω δt ≪ 1.
-fn note_fast_springs(world: &mut World) {
-    let growth = *world.resource::<Growth>();
-    for Population { name, speed, .. } in world.resource::<Populations>().0.clone() {
-        let found = derived(growth.turning_rate, growth.filopodium_length, speed, growth.filopodia_time);
-        if found.omega_filopodia_time > 0.3 {
-            let value = found.omega_filopodia_time;
-            let text =
-                format!("population `{name}`: omega dt = {value:.2}; eq. (1) holds for values well below 1 (0.3)");
-            world.resource_mut::<Health>().note(text);
-        }
+/// What the core itself knows of the scene's needs and limits; passed limits become notes.
+fn plan(world: &mut World, loaded: &Loaded, roster: &Roster) {
+    let (growth, clock) = (*world.resource::<Growth>(), *world.resource::<Clock>());
+    let step = clock.grid.hours(clock.grid.step_ticks());
+    let populations = world.resource::<Populations>().0.clone();
+    let [low, high] = world.resource::<Tissue>().domain.bounding_box();
+    let extent = (high[0] - low[0]).min(high[1] - low[1]);
+    let mut plan = world.resource_mut::<Plan>();
+    for entry in roster.entries.iter().filter(|entry| !loaded.blocks.contains_key(entry.name)) {
+        plan.leave_out(entry.name, "the scene has no such block");
     }
+    for Population { name, speed, .. } in populations {
+        let found = derived(growth.turning_rate, growth.filopodium_length, speed, growth.filopodia_time);
+        let ratio = found.omega_filopodia_time;
+        plan.compare(format!("population `{name}`: omega dt, for which eq. (1) is derived"), ratio, 0.3, "shorter dt");
+        let advice = "a shorter step";
+        plan.compare(
+            format!("population `{name}`: step length over the tissue's smaller extent"),
+            speed * step / extent,
+            0.1,
+            advice,
+        );
+    }
+    if let Some(limit) = growth.method.stability_limit() {
+        let value = growth.turning_rate * step * plan.strongest_pull;
+        plan.compare("kappa times step times the strongest pull", value, limit, "a shorter step, or `rotation`");
+    }
+    let passed: Vec<String> =
+        plan.margins.iter().filter(|margin| margin.is_passed()).map(ToString::to_string).collect();
+    let mut health = world.resource_mut::<Health>();
+    passed.into_iter().for_each(|note| health.note(note));
 }
 
 fn add_core_systems(world: &World, schedules: &mut Schedules) {

@@ -1,4 +1,5 @@
 //! Runs, and runs of runs.
 
+pub mod plan;
 pub mod run;
 pub mod seeds;

@@ -81,10 +81,7 @@ pub fn simulate(
     keep_trajectories: bool,
     mut tick: impl FnMut(f64),
 ) -> Result<Finished, RunError> {
-    let mut simulation = Simulation::assemble(loaded, roster).map_err(|error| match error {
-        AssemblyError::Scenario(problems) => RunError::Scenario(ScenarioErrors { path: path.to_owned(), problems }),
-        AssemblyError::Solve(account) => RunError::Solve(account),
-    })?;
+    let mut simulation = assembled(loaded, roster, path)?;
     let clock = *simulation.world().resource::<Clock>();
     let mut recorder = Recorder::new(&recorder_options(loaded, keep_trajectories), &clock.grid, clock.end);
     let fault = run_to_end(&mut simulation, &mut recorder, &mut tick)?;
@@ -98,6 +95,17 @@ pub fn simulate(
     };
     let summary = Summary::of(simulation.world(), &options, fault.as_ref());
     Ok(Finished { summary, recorder })
+}
+
+/// Puts a scene together and solves what must be solved before the first step.
+///
+/// # Errors
+/// A scene that cannot be assembled.
+pub fn assembled(loaded: &Loaded, roster: &Roster, path: &Path) -> Result<Simulation, RunError> {
+    Simulation::assemble(loaded, roster).map_err(|error| match error {
+        AssemblyError::Scenario(problems) => RunError::Scenario(ScenarioErrors { path: path.to_owned(), problems }),
+        AssemblyError::Solve(account) => RunError::Solve(account),
+    })
 }
 
 fn recorder_options(loaded: &Loaded, keep_trajectories: bool) -> RecorderOptions {

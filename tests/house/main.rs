@@ -23,6 +23,8 @@ const SEAM_FILES: &[&str] = &[
     "src/model/quantity_macro.rs",
     "src/model/keys.rs",
     "src/model/shape.rs",
+    "src/model/health.rs",
+    "src/model/plan.rs",
 ];
 
 /// Files of `systems/` that other mechanisms may name.
@@ -39,7 +41,7 @@ const ROOMS: &[Room] = &[
         folder: "src/model",
         rooms: &["model", "numerics", "keys", "quantity"],
         packages: &["bevy_ecs", "nalgebra", "rand", "rand_distr", "rayon", "thiserror"],
-        rule: "model names numerics and itself, never scenario, record, systems, simulation or study; serde and schemars in the seam only",
+        rule: "model names numerics and itself, never scenario, record, systems, simulation or study; serde and schemars in the seam, the counters and the plan only",
     },
     Room {
         folder: "systems",
@@ -68,7 +70,7 @@ const ROOMS: &[Room] = &[
     Room {
         folder: "src/study",
         rooms: &["study", "simulation", "scenario", "record", "model"],
-        packages: &["serde", "serde_json", "rayon", "thiserror"],
+        packages: &["bevy_ecs", "serde", "serde_json", "rayon", "thiserror"],
         rule: "study names simulation, scenario and record; never systems or numerics",
     },
 ];

@@ -1,0 +1,118 @@
+//! What a scene needs before it runs: everything is put together and solved as for a run, but no step is taken.
+
+use super::run::{RunError, assembled};
+use crate::model::clock::Clock;
+use crate::model::components::GrowthCone;
+use crate::model::health::{Counters, Health};
+use crate::model::mechanism::Roster;
+use crate::model::plan::Plan;
+use crate::model::tissue::Tissue;
+use crate::record::summary::{DerivedConstants, constants};
+use crate::scenario::load::Loaded;
+use bevy_ecs::prelude::World;
+use serde::Serialize;
+use std::collections::BTreeMap;
+use std::fmt;
+use std::path::Path;
+
+/// The plan of a scene, with the work that it means.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ScenePlan {
+    /// Name of the scene.
+    pub scene: String,
+    /// Parts and margins.
+    pub plan: Plan,
+    /// Derived constants of eq. (1), by population.
+    pub derived: BTreeMap<String, DerivedConstants>,
+    /// Vertices of the mesh.
+    pub mesh_vertices: usize,
+    /// Cells of the mesh.
+    pub mesh_cells: usize,
+    /// Steps of the clock.
+    pub steps: u64,
+    /// Steps of growing cones if no cone ends before the run does.
+    pub cone_steps_at_most: u64,
+    /// Points in `trajectories.csv` if every cone is recorded to the end; 0 when none are kept.
+    pub trajectory_points_at_most: u64,
+    /// What has been solved already.
+    pub solved: Counters,
+    /// What the user should know of.
+    pub notes: Vec<String>,
+}
+
+/// Puts a scene together and says what it needs.
+///
+/// # Errors
+/// A scene that cannot be assembled.
+pub fn plan(loaded: &Loaded, roster: &Roster, path: &Path) -> Result<ScenePlan, RunError> {
+    let mut simulation = assembled(loaded, roster, path)?;
+    let world: &World = simulation.world();
+    let clock = *world.resource::<Clock>();
+    let lifetimes = lifetimes(world, &clock);
+    let interval = clock.grid.nearest(loaded.scene.output.trajectory_interval.0).max(1);
+    let mesh = &world.resource::<Tissue>().mesh;
+    let found = ScenePlan {
+        scene: loaded.scene.name.clone(),
+        plan: world.resource::<Plan>().clone(),
+        derived: constants(world),
+        mesh_vertices: mesh.vertex_count(),
+        mesh_cells: mesh.cell_count(),
+        steps: clock.end.div_ceil(clock.grid.step_ticks()),
+        cone_steps_at_most: lifetimes.iter().map(|ticks| ticks.div_ceil(clock.grid.step_ticks())).sum(),
+        trajectory_points_at_most: lifetimes.iter().map(|ticks| ticks / interval + 1).sum(),
+        solved: simulation.counters(),
+        notes: world.resource::<Health>().notes().to_vec(),
+    };
+    simulation.lap("plan");
+    Ok(found)
+}
+
+/// Ticks from the birth of each cone to the end of the run, of those born before it.
+fn lifetimes(world: &World, clock: &Clock) -> Vec<u64> {
+    let Some(mut cones) = world.try_query::<&GrowthCone>() else { return Vec::new() };
+    cones.iter(world).filter_map(|cone| clock.end.checked_sub(cone.birth)).filter(|ticks| *ticks > 0).collect()
+}
+
+impl fmt::Display for ScenePlan {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(f, "{}: {} vertices, {} cells", self.scene, self.mesh_vertices, self.mesh_cells)?;
+        for (title, kept) in [("needs", true), ("does not need", false)] {
+            writeln!(f, "{title}")?;
+            let mut parts = self.plan.parts.iter().filter(|part| part.kept == kept).peekable();
+            if parts.peek().is_none() {
+                writeln!(f, "  nothing")?;
+            }
+            for part in parts {
+                writeln!(f, "  {:<28}{}", part.name, part.why)?;
+            }
+        }
+        let Counters { matrix_solves, newton_iterations, cue_solves, cue_factorisations, .. } = self.solved;
+        writeln!(f, "work")?;
+        writeln!(f, "  {:<28}{matrix_solves} ({newton_iterations} Newton iterations)", "equilibria solved")?;
+        writeln!(f, "  {:<28}{cue_solves} ({cue_factorisations} factorisations)", "cue fields solved")?;
+        writeln!(f, "  {:<28}{}, at most {} of cones", "steps", self.steps, self.cone_steps_at_most)?;
+        writeln!(f, "  {:<28}at most {}", "points of trajectories", self.trajectory_points_at_most)?;
+        writeln!(f, "derived")?;
+        for (population, constants) in &self.derived {
+            let radius = constants.turning_radius.map_or("infinite".to_owned(), |r| format!("{r:.2} um"));
+            writeln!(
+                f,
+                "  {population}: kappa = {:.3} /h, omega = {:.3} /h, omega dt = {:.3}, turning radius {radius}",
+                constants.turning_rate, constants.omega, constants.omega_filopodia_time
+            )?;
+        }
+        writeln!(f, "margins")?;
+        for margin in &self.plan.margins {
+            let mark = if margin.is_passed() {
+                "  PASSED: "
+            } else if margin.is_thin() {
+                "  thin: "
+            } else {
+                ""
+            };
+            let advice = if mark.is_empty() { "" } else { &margin.advice };
+            writeln!(f, "  {}: {:.3} of {:.3}{mark}{advice}", margin.name, margin.value, margin.limit)?;
+        }
+        Ok(())
+    }
+}

@@ -154,8 +154,8 @@ impl ContactLaw {
             let [w0, w1] = touch.moments;
             let tangential = toward * w1 + self.alignment * direction(touch.along) * w0 / reach;
             let h = adhesion(touch.owner);
-            for k in 0..D {
-                sum[k] += (touch.normal[k] * (toward * w0) + touch.tangent[k] * tangential) * h;
+            for (k, sum) in sum.iter_mut().enumerate() {
+                *sum += (touch.normal[k] * (toward * w0) + touch.tangent[k] * tangential) * h;
             }
         }
         sum

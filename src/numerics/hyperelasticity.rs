@@ -10,6 +10,7 @@
 //! Displacements and forces are flat, stride `D`: component `c` of vertex `v` at `v D + c`. In the plane energies and forces
 //! are per length of the third direction (Pa µm², Pa µm).
 
+use rayon::prelude::*;
 use std::sync::Arc;
 
 pub use crate::numerics::imposed_motion::Prescribed;
@@ -18,6 +19,11 @@ use crate::numerics::imposed_motion::largest_extent;
 use crate::numerics::material::{Material, Tensor, jacobian, principal_stretches};
 use crate::numerics::simplex_mesh::SimplexMesh;
 use crate::numerics::sparse::{PRESCRIBED, SparseError, SymmetricMatrix, SymmetricPattern};
+
+/// Corners of a simplex at most.
+const MOST_CORNERS: usize = 4;
+/// Cells that one task looks at, at least.
+const CELLS_A_TASK: usize = 256;
 
 /// Why a body could not be set up.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -212,7 +218,7 @@ impl<'m, const D: usize> Body<'m, D> {
     /// Strain energy `W(U)` (Pa µm^D).
     pub fn energy(&self, displacement: &[f64]) -> f64 {
         let density = |cell| self.material.energy(&self.deformation_gradient(displacement, cell));
-        self.volumes.iter().enumerate().map(|(cell, volume)| volume * density(cell)).sum()
+        self.in_each_cell(density).iter().zip(&self.volumes).map(|(density, volume)| volume * density).sum()
     }
 
     /// Internal forces `f = ∂W/∂U` (Pa µm^(D−1)) at all unknowns: zero at the free ones in equilibrium, the reaction (force of
@@ -229,10 +235,15 @@ impl<'m, const D: usize> Body<'m, D> {
         })
     }
 
-    fn assemble_forces(&self, stress: impl Fn(usize) -> Tensor<D>) -> Vec<f64> {
+    /// What `of` says of each cell, found in parallel; sums over cells are taken in their order, so that bits do not depend on
+    /// the number of threads.
+    fn in_each_cell<T: Send>(&self, of: impl Fn(usize) -> T + Sync + Send) -> Vec<T> {
+        (0..self.mesh.cell_count()).into_par_iter().with_min_len(CELLS_A_TASK).map(of).collect()
+    }
+
+    fn assemble_forces(&self, stress: impl Fn(usize) -> Tensor<D> + Sync + Send) -> Vec<f64> {
         let mut forces = vec![0.0; self.rows.len()];
-        for (cell, volume) in self.volumes.iter().enumerate() {
-            let weighted = stress(cell) * *volume;
+        for (cell, weighted) in self.in_each_cell(|cell| stress(cell) * self.volumes[cell]).into_iter().enumerate() {
             for (&vertex, gradient) in self.mesh.cell(cell).iter().zip(self.cell_gradients(cell)) {
                 for i in 0..D {
                     forces[vertex as usize * D + i] += (0..D).map(|k| weighted[(i, k)] * gradient[k]).sum::<f64>();
@@ -269,21 +280,23 @@ impl<'m, const D: usize> Body<'m, D> {
     /// Assembles the tangent `K = ∂f/∂U` of the free unknowns, `K_(ai)(bk) = V Σ ∂P_iJ/∂F_kL ∂_Jλ_a ∂_Lλ_b`, into a matrix of
     /// this body's [`Self::pattern`].
     pub fn assemble_tangent(&self, displacement: &[f64], tangent: &mut SymmetricMatrix) {
-        tangent.clear();
-        let mut columns: Vec<Tensor<D>> = Vec::with_capacity(SimplexMesh::<D>::STRIDE * D);
-        for (cell, volume) in self.volumes.iter().enumerate() {
+        let columns_of = |cell: usize| {
             let gradient = self.deformation_gradient(displacement, cell);
-            let shapes = self.cell_gradients(cell);
-            columns.clear();
-            for shape in shapes {
-                for k in 0..D {
-                    let increment = Tensor::from_fn(|i, j| if i == k { volume * shape[j] } else { 0.0 });
-                    columns.push(self.material.stress_increment(&gradient, &increment));
+            let mut columns = [[Tensor::<D>::zeros(); D]; MOST_CORNERS];
+            for (shape, columns) in self.cell_gradients(cell).iter().zip(&mut columns) {
+                for (k, column) in columns.iter_mut().enumerate() {
+                    let increment = Tensor::from_fn(|i, j| if i == k { self.volumes[cell] * shape[j] } else { 0.0 });
+                    *column = self.material.stress_increment(&gradient, &increment);
                 }
             }
+            columns
+        };
+        tangent.clear();
+        for (cell, columns) in self.in_each_cell(columns_of).into_iter().enumerate() {
+            let shapes = self.cell_gradients(cell);
             tangent.add_element(cell, |row, column| {
-                let shape = &shapes[row / D];
-                (0..D).map(|j| columns[column][(row % D, j)] * shape[j]).sum()
+                let (shape, stress) = (&shapes[row / D], &columns[column / D][column % D]);
+                (0..D).map(|j| stress[(row % D, j)] * shape[j]).sum()
             });
         }
     }

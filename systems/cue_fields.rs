@@ -327,7 +327,7 @@ impl<'a> CueProblem<'a> {
             let value: Vec<f64> = c.iter().zip(slope).map(|(c, dc)| c + e * dc).collect();
             self.recovery.recover(&x, &value, true)
         };
-        let (ahead, behind) = (shifted(1.0), shifted(-1.0));
+        let (ahead, behind) = rayon::join(|| shifted(1.0), || shifted(-1.0));
         ahead.iter().zip(&behind).map(|(a, b)| [0, 1].map(|k| (a[k] - b[k]) / (2.0 * step))).collect()
     }
 

@@ -7,8 +7,9 @@
 //!
 //! The tree is not asked every step. Cones that sit in one square of a coarse grid share a list of candidates, which is asked
 //! of the tree when the first cone enters the square, kept up to date as vertices are laid, and dropped when the last cone
-//! has gone. Lists hold more than is near and are sorted; what is not within reach adds exactly nothing, so results are those of
-//! looking at every segment of every shaft, to the last bit.
+//! has gone. A list names blocks of stored vertices, with a bit for each vertex that may be near. Lists hold more than is near
+//! and are sorted; what is not within reach adds exactly nothing, so results are those of looking at every segment of every
+//! shaft, to the last bit.
 
 use crate::model::shafts::BLOCK;
 use crate::numerics::locate::MaterialPoint;
@@ -23,6 +24,9 @@ use std::sync::{Mutex, PoisonError};
 
 type Entry = GeomWithData<[f64; 2], VertexId>;
 type Square = [i32; 2];
+/// A block of vertices, and a bit for each of them that is meant.
+type Part = (u32, u16);
+const _: () = assert!(BLOCK == u16::BITS as usize);
 
 /// Side of a square over the reach.
 const SIDE: f64 = 3.0;
@@ -72,52 +76,40 @@ pub struct ShaftIndex {
     tree: RTree<Entry>,
     reach: f64,
     radius: f64,
-    lists: HashMap<Square, Vec<VertexId>>,
+    lists: HashMap<Square, Vec<Part>>,
     places: Places,
 }
 
-/// Positions now of the vertices in blocks that some list names, each found once for all squares.
+/// Positions now (µm) of a block's vertices, and of the point that the last of them leads to.
+type Polyline = [[f64; 2]; BLOCK + 1];
+
+/// Polylines of the blocks that some list names, each found once for all squares.
 #[derive(Debug, Default)]
 struct Places {
-    positions: Vec<[[f64; 2]; BLOCK]>,
-    /// For each block, one more than the revision of the configuration it was found in; 0 when not yet, or no longer complete.
+    positions: Vec<Polyline>,
+    /// For each block, one more than the revision of the configuration it was found in; 0 when not yet, or when it still grows.
     revisions: Vec<u64>,
     stale: Vec<bool>,
 }
 
 impl Places {
-    /// Finds the blocks of all listed vertices, and those that follow them.
-    fn bring_up_to_date<'a>(&mut self, scene: &ShaftScene, listed: impl Iterator<Item = &'a VertexId>) {
+    /// Finds the blocks of all lists.
+    fn bring_up_to_date<'a>(&mut self, scene: &ShaftScene, listed: impl Iterator<Item = &'a Part>) {
         let (now, blocks) = (scene.configuration.revision + 1, scene.shafts.block_count());
-        self.positions.resize(blocks, [[0.0; 2]; BLOCK]);
+        self.positions.resize(blocks, [[0.0; 2]; BLOCK + 1]);
         self.revisions.resize(blocks, 0);
         self.stale.resize(blocks, false);
-        let mut want = |block: u32| self.stale[block as usize] = self.revisions[block as usize] != now;
-        for &vertex in listed {
-            let block = vertex / BLOCK as u32;
-            want(block);
-            if vertex as usize % BLOCK == BLOCK - 1 {
-                scene.shafts.block_after(block).into_iter().for_each(&mut want);
-            }
+        for &(block, _) in listed {
+            self.stale[block as usize] = self.revisions[block as usize] != now;
         }
         let blocks = self.positions.par_iter_mut().zip(&mut self.revisions).zip(&mut self.stale).enumerate();
         blocks.with_min_len(64).filter(|(_, (_, stale))| **stale).for_each(
             |(block, ((positions, revision), stale))| {
-                *positions = scene.block(block as u32);
-                (*revision, *stale) = (now, false);
+                *positions = scene.polyline(block as u32);
+                *revision = if scene.shafts.block_after(block as u32).is_some() { now } else { 0 };
+                *stale = false;
             },
         );
-    }
-
-    fn forget(&mut self, vertex: VertexId) {
-        if let Some(revision) = self.revisions.get_mut(vertex as usize / BLOCK) {
-            *revision = 0;
-        }
-    }
-
-    #[inline]
-    fn position(&self, vertex: VertexId) -> [f64; 2] {
-        self.positions[vertex as usize / BLOCK][vertex as usize % BLOCK]
     }
 }
 
@@ -189,22 +181,20 @@ impl ShaftIndex {
         let low = positions().fold(Vector2::repeat(f64::INFINITY), |m, x| m.inf(&x)).add_scalar(-self.reach);
         let high = positions().fold(Vector2::repeat(f64::NEG_INFINITY), |m, x| m.sup(&x)).add_scalar(self.reach);
         segments.clear();
-        for &vertex in &self.lists[&group[0].0] {
-            let start = self.places.position(vertex);
-            let end = match scene.shafts.successor(vertex) {
-                Successor::Vertex(next) => self.places.position(next),
-                Successor::Tip(shaft) => scene.position(scene.shafts.tip(shaft)),
-            };
-            let apart = |k: usize| start[k].max(end[k]) < low[k] || start[k].min(end[k]) > high[k];
-            if !apart(0) && !apart(1) {
-                segments.push(start, end, scene.shafts.owner(vertex));
+        for &(block, vertices) in &self.lists[&group[0].0] {
+            let (polyline, owner) = (&self.places.positions[block as usize], scene.shafts.block_owner(block));
+            for ends in polyline.windows(2).enumerate().filter(|(i, _)| vertices >> i & 1 == 1).map(|(_, ends)| ends) {
+                let (start, end) = (ends[0], ends[1]);
+                let apart = |k: usize| start[k].max(end[k]) < low[k] || start[k].min(end[k]) > high[k];
+                if !apart(0) && !apart(1) {
+                    segments.push(start, end, owner);
+                }
             }
         }
     }
 
     fn add(&mut self, vertex: VertexId, at: [f64; 2], longest: f64) {
         self.tree.insert(Entry::new(at, vertex));
-        self.places.forget(vertex);
         let side = SIDE * self.reach;
         let margin = self.radius + longest;
         let low = square(Vector3::new(at[0] - margin, at[1] - margin, 0.0), side);
@@ -212,10 +202,19 @@ impl ShaftIndex {
         for x in low[0]..=high[0] {
             for y in low[1]..=high[1] {
                 if let Some(list) = self.lists.get_mut(&[x, y]) {
-                    list.insert(list.partition_point(|other| *other < vertex), vertex);
+                    name(list, vertex);
                 }
             }
         }
+    }
+}
+
+/// Puts a vertex into a list.
+fn name(list: &mut Vec<Part>, vertex: VertexId) {
+    let (block, bit) = (vertex / BLOCK as u32, 1 << (vertex as usize % BLOCK));
+    match list.binary_search_by_key(&block, |(other, _)| *other) {
+        Ok(at) => list[at].1 |= bit,
+        Err(at) => list.insert(at, (block, bit)),
     }
 }
 
@@ -224,12 +223,14 @@ fn square(x: Vector3<f64>, side: f64) -> Square {
 }
 
 /// All vertices within a margin of a square, ascending.
-fn ask(tree: &RTree<Entry>, [x, y]: Square, side: f64, margin: f64) -> Vec<VertexId> {
+fn ask(tree: &RTree<Entry>, [x, y]: Square, side: f64, margin: f64) -> Vec<Part> {
     let low = [f64::from(x) * side - margin, f64::from(y) * side - margin];
     let high = [f64::from(x + 1) * side + margin, f64::from(y + 1) * side + margin];
     let near = tree.locate_in_envelope_intersecting(AABB::from_corners(low, high));
-    let mut list: Vec<VertexId> = near.map(|entry| entry.data).collect();
-    list.sort_unstable();
+    let mut vertices: Vec<VertexId> = near.map(|entry| entry.data).collect();
+    vertices.sort_unstable();
+    let mut list = Vec::new();
+    vertices.into_iter().for_each(|vertex| name(&mut list, vertex));
     list
 }
 
@@ -255,11 +256,17 @@ impl ShaftScene<'_> {
         point.position(&self.tissue.mesh, &self.configuration.coordinates)
     }
 
-    /// Positions now of a block's vertices (µm), zeros for those not yet stored.
-    fn block(&self, block: u32) -> [[f64; 2]; BLOCK] {
-        let mut positions = [[0.0; 2]; BLOCK];
-        for (position, vertex) in positions.iter_mut().zip(self.shafts.block_vertices(block)) {
-            *position = self.position(self.shafts.point(vertex));
+    /// Positions now (µm) of a block's vertices and of the point after them; zeros for vertices not yet stored.
+    fn polyline(&self, block: u32) -> Polyline {
+        let mut positions = [[0.0; 2]; BLOCK + 1];
+        let vertices = self.shafts.block_vertices(block);
+        let after = match self.shafts.block_after(block) {
+            Some(next) => self.shafts.point(self.shafts.block_vertices(next).start),
+            None => self.shafts.tip(self.shafts.block_owner(block)),
+        };
+        let points = vertices.map(|vertex| self.shafts.point(vertex)).chain([after]);
+        for (position, point) in positions.iter_mut().zip(points) {
+            *position = self.position(point);
         }
         positions
     }

@@ -102,6 +102,12 @@ impl Shafts {
         first..first + u32::from(self.used[block as usize])
     }
 
+    /// The shaft that a block belongs to.
+    #[inline]
+    pub fn block_owner(&self, block: u32) -> u32 {
+        self.owner[block as usize]
+    }
+
     /// The block in which the shaft of a block goes on.
     pub fn block_after(&self, block: u32) -> Option<u32> {
         Some(self.next[block as usize]).filter(|&next| next != NONE)

@@ -54,7 +54,24 @@ pub fn to_png(svg: &str, scale: f32) -> Result<Vec<u8>, PngError> {
     let (canvas, drawings) = rayon::join(images, || usvg::Tree::from_str(svg, &options_without_images()));
     let mut canvas = canvas?;
     resvg::render(&drawings?, to_pixels, &mut canvas.as_mut());
-    canvas.encode_png().map_err(|error| PngError::Encode(error.to_string()))
+    encode(canvas)
+}
+
+/// A picture as PNG, compressed lightly: a tenth of the time of a thorough compression.
+///
+/// # Errors
+/// An encoder that fails.
+pub fn encode(picture: Pixmap) -> Result<Vec<u8>, PngError> {
+    let failed = |error: png::EncodingError| PngError::Encode(error.to_string());
+    let mut file = Vec::new();
+    let mut encoder = png::Encoder::new(&mut file, picture.width(), picture.height());
+    encoder.set_color(png::ColorType::Rgba);
+    encoder.set_depth(png::BitDepth::Eight);
+    encoder.set_compression(png::Compression::Fast);
+    let mut writer = encoder.write_header().map_err(failed)?;
+    writer.write_image_data(&picture.take_demultiplied()).map_err(failed)?;
+    writer.finish().map_err(failed)?;
+    Ok(file)
 }
 
 /// Parser options that leave out images.

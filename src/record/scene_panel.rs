@@ -3,6 +3,7 @@
 use super::colour::{Effect, from_srgb, glaze, hexadecimal, to_srgb};
 use super::cue_scale::{CueScale, total_concentration};
 use super::markers::draw_markers;
+use super::png::encode;
 use super::polyline::simplify;
 use super::raster::{Coverage, Sheet, Triangles, paint_cells};
 use super::scene_figure::{BorderLine, FigureError, MOST_LINES, Panel, SceneFigure, TipStatus};
@@ -238,7 +239,7 @@ fn sheet_over(points: &[[f64; 2]], density: f64) -> Option<Sheet> {
 
 /// Writes an image made on a sheet in px from the common frame's corner.
 fn place_image(svg: &mut Svg, view: &View, sheet: &Sheet, image: Option<Pixmap>) -> Result<(), FigureError> {
-    let png = image.and_then(|image| image.encode_png().ok()).ok_or(FigureError::Image)?;
+    let png = image.and_then(|image| encode(image).ok()).ok_or(FigureError::Image)?;
     let corner = [view.corner[0] + sheet.corner[0], view.corner[1] + sheet.corner[1]];
     svg.image(corner, sheet.size(), &png);
     Ok(())

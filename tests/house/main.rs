@@ -58,7 +58,18 @@ const ROOMS: &[Room] = &[
     Room {
         folder: "src/record",
         rooms: &["record", "model", "numerics", "scenario"],
-        packages: &["bevy_ecs", "serde", "serde_json", "nalgebra", "rand", "rayon", "resvg", "thiserror", "ttf_parser"],
+        packages: &[
+            "bevy_ecs",
+            "serde",
+            "serde_json",
+            "nalgebra",
+            "png",
+            "rand",
+            "rayon",
+            "resvg",
+            "thiserror",
+            "ttf_parser",
+        ],
         rule: "record reads the model and writes files; it never names systems, simulation or study",
     },
     Room {

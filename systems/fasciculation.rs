@@ -12,11 +12,21 @@
 //! unless a key allows it. All cones read the shafts of the step's start: the result does not depend on their order, and contact
 //! is of first order in Δt whatever the method.
 
-use super::shaft_index::{Asking, ShaftIndex, ShaftScene};
+use super::shaft_index::{Asking, Search, ShaftIndex, ShaftScene};
 use crate::numerics::contact_integral::Felt;
 use crate::numerics::segments::Sensed;
 use crate::prelude::*;
 use std::collections::BTreeMap;
+
+/// How the shafts near a growth cone are found. Results do not depend on it, to the last bit.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Neighbours {
+    /// By an R-tree.
+    Tree,
+    /// By looking at every segment of every shaft: slow, and there to be compared with.
+    All,
+}
 
 keys! {
     /// Homophilic attraction to the shafts of other axons; L̂ += λ_f F.
@@ -40,6 +50,8 @@ keys! {
         pub follow_backwards: bool = false,
         /// Adhesion h between populations, row (who feels) by column (who is felt); 1 where nothing is given. Ours.
         pub adhesion: BTreeMap<String, BTreeMap<String, Factor>> = BTreeMap::new(),
+        /// How shafts near a cone are found. Ours.
+        pub neighbours: Neighbours = Neighbours::Tree,
     }
 }
 
@@ -77,7 +89,11 @@ impl Mechanism for Fasciculation {
         );
         plan.keep("shaft index", format!("fasciculation feels shafts within {} um", self.reach.0));
         model.pulls_up_to(self.weight.0);
-        ShaftIndex::install(model, self.reach.0);
+        let search = match self.neighbours {
+            Neighbours::Tree => Search::Tree,
+            Neighbours::All => Search::All,
+        };
+        ShaftIndex::install(model, self.reach.0, search);
         model.insert(table).insert_law(self).term(Term::Contact, attract);
         Ok(())
     }

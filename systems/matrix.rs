@@ -5,6 +5,7 @@
 //! polynomials; v_φ = ṡ times the derivative of that interpolant. The paper moves top and bottom by "about 20 % of the initial
 //! vertical dimension for each side"; ours: outward, held sideways, linear in time, material numbers.
 
+use crate::numerics::hermite::Interpolation as Course;
 use crate::numerics::hyperelasticity::{Body, Prescribed};
 use crate::numerics::load_path::{LoadPath, LoadPathOptions};
 use crate::numerics::material::{Lame, Material, NeoHookean, StVenantKirchhoff};
@@ -30,6 +31,16 @@ pub enum Sideways {
     Held,
     /// Sliding: only the component along the edge's normal is imposed; the edge must be parallel to an axis.
     Sliding,
+}
+
+/// What the matrix does between two load levels.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Interpolation {
+    /// The cubic through displacements and their rates: v_φ is continuous.
+    Cubic,
+    /// The straight line: v_φ jumps at levels. There to be compared with.
+    Linear,
 }
 
 keys! {
@@ -69,6 +80,8 @@ keys! {
         /// Largest error of the interpolated displacement between load levels, over the tissue's size. Ours.
         #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 0.1, "x-typical" = [1e-8, 1e-4]))]
         pub tolerance: Factor = Factor(1e-6),
+        /// What the displacement does between load levels. Ours.
+        pub interpolation: Interpolation = Interpolation::Cubic,
     }
 }
 
@@ -156,7 +169,11 @@ impl Mechanism for Matrix {
         let tissue = model.world.resource::<Tissue>();
         let prescribed = self.prescribed(tissue)?;
         let body = Body::new(&tissue.mesh, self.law()?, prescribed).map_err(solve_error)?;
-        let options = LoadPathOptions { tolerance: self.tolerance.0, ..LoadPathOptions::default() };
+        let interpolation = match self.interpolation {
+            Interpolation::Cubic => Course::Cubic,
+            Interpolation::Linear => Course::Linear,
+        };
+        let options = LoadPathOptions { tolerance: self.tolerance.0, interpolation, ..LoadPathOptions::default() };
         let path = LoadPath::solve(&body, &options).map_err(|error| {
             InstallError::Solve(format!("the matrix (eq. 3) has no path to its full load: {error}{}", remedy(&self)))
         })?;

@@ -55,6 +55,16 @@ impl<T: Default> Pool<T> {
     }
 }
 
+/// How segments near a cone are found.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum Search {
+    /// By the tree.
+    #[default]
+    Tree,
+    /// By looking at all of them.
+    All,
+}
+
 /// A cone that asks for its neighbours.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Asking {
@@ -74,6 +84,7 @@ pub struct Asking {
 #[derive(Debug, Resource, Default)]
 pub struct ShaftIndex {
     tree: RTree<Entry>,
+    search: Search,
     reach: f64,
     radius: f64,
     lists: HashMap<Square, Vec<Part>>,
@@ -114,12 +125,16 @@ impl Places {
 }
 
 impl ShaftIndex {
-    /// Puts the index into a model for mechanisms that look `reach` far (µm); the farthest counts.
-    pub fn install(model: &mut ModelBuilder, reach: f64) {
+    /// Puts the index into a model for mechanisms that look `reach` far (µm); the farthest counts, and one that wants
+    /// to look at everything.
+    pub fn install(model: &mut ModelBuilder, reach: f64, search: Search) {
         match model.world.get_resource_mut::<ShaftIndex>() {
-            Some(mut index) => index.reach = index.reach.max(reach),
+            Some(mut index) => {
+                index.reach = index.reach.max(reach);
+                index.search = if search == Search::All { search } else { index.search };
+            }
             None => {
-                model.insert(ShaftIndex { reach, ..ShaftIndex::default() });
+                model.insert(ShaftIndex { search, reach, ..ShaftIndex::default() });
                 model.phase(Phase::Neighbours, index_new_vertices);
             }
         }
@@ -164,6 +179,9 @@ impl ShaftIndex {
             self.radius = needed * if scene.configuration.moves { ROOM } else { 1.0 };
             self.lists.clear();
         }
+        if self.search == Search::All {
+            return self.name_everything(scene, order);
+        }
         self.lists.retain(|square, _| order.binary_search_by_key(square, |(other, _)| *other).is_ok());
         let mut missing: Vec<Square> = order.iter().map(|(square, _)| *square).collect();
         missing.dedup();
@@ -175,18 +193,28 @@ impl ShaftIndex {
         self.places.bring_up_to_date(scene, self.lists.values().flatten());
     }
 
+    /// One list of all vertices for each square in use: no cone is spared anything.
+    fn name_everything(&mut self, scene: &ShaftScene, order: &[(Square, u32)]) {
+        let all = |used: usize| if used == BLOCK { u16::MAX } else { (1 << used) - 1 };
+        let blocks = 0..scene.shafts.block_count() as u32;
+        let list: Vec<Part> = blocks.map(|block| (block, all(scene.shafts.block_vertices(block).len()))).collect();
+        self.places.bring_up_to_date(scene, list.iter());
+        self.lists = order.chunk_by(|a, b| a.0 == b.0).map(|group| (group[0].0, list.clone())).collect();
+    }
+
     /// The segments of a square's list that come near any cone of a group.
     fn gather(&self, scene: &ShaftScene, group: &[(Square, u32)], cones: &[Asking], segments: &mut Segments<2>) {
         let positions = || group.iter().map(|(_, i)| cones[*i as usize].position.xy());
         let low = positions().fold(Vector2::repeat(f64::INFINITY), |m, x| m.inf(&x)).add_scalar(-self.reach);
         let high = positions().fold(Vector2::repeat(f64::NEG_INFINITY), |m, x| m.sup(&x)).add_scalar(self.reach);
+        let everything = self.search == Search::All;
         segments.clear();
         for &(block, vertices) in &self.lists[&group[0].0] {
             let (polyline, owner) = (&self.places.positions[block as usize], scene.shafts.block_owner(block));
             for ends in polyline.windows(2).enumerate().filter(|(i, _)| vertices >> i & 1 == 1).map(|(_, ends)| ends) {
                 let (start, end) = (ends[0], ends[1]);
                 let apart = |k: usize| start[k].max(end[k]) < low[k] || start[k].min(end[k]) > high[k];
-                if !apart(0) && !apart(1) {
+                if everything || !apart(0) && !apart(1) {
                     segments.push(start, end, owner);
                 }
             }

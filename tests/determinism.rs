@@ -62,6 +62,17 @@ fn contact_between_axons_does_not_depend_on_threads_either() {
 }
 
 #[test]
+fn the_tree_finds_what_looking_at_every_segment_of_a_deforming_tissue_finds() {
+    let roster = systems::standard();
+    let [tree, all] = ["tree", "all"].map(|neighbours| {
+        let mut scene = scene(60, 8.0, true);
+        scene["fasciculation"] = json!({ "neighbours": neighbours });
+        bits(&loaded(&scene, &roster))
+    });
+    assert_eq!(tree, all);
+}
+
+#[test]
 fn another_seed_gives_other_bits() {
     let roster = systems::standard();
     let mut loaded = loaded(&scene(5, 2.0, false), &roster);

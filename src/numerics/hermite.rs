@@ -50,10 +50,21 @@ pub enum HermiteError {
     },
 }
 
-/// A vector along a parameter, cubic between levels.
+/// What a path does between two levels.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Interpolation {
+    /// The cubic through values and slopes; the derivative is continuous.
+    #[default]
+    Cubic,
+    /// The straight line through the values: of order 2, its derivative constant between levels (order 1). For comparison.
+    Linear,
+}
+
+/// A vector along a parameter, cubic between levels unless asked otherwise.
 #[derive(Debug, Clone, PartialEq)]
 pub struct HermitePath {
     levels: Vec<Level>,
+    interpolation: Interpolation,
 }
 
 /// Where a parameter lies in a path, and the weights there: find once, use for as many components as needed.
@@ -82,7 +93,12 @@ impl HermitePath {
                 return Err(HermiteError::Length { level, value: value.len(), slope: slope.len(), wanted });
             }
         }
-        Ok(Self { levels })
+        Ok(Self { levels, interpolation: Interpolation::Cubic })
+    }
+
+    /// The same levels with another course between them.
+    pub fn interpolated(self, interpolation: Interpolation) -> Self {
+        Self { interpolation, ..self }
     }
 
     /// The levels, in ascending order of their parameter; there is at least one.
@@ -109,6 +125,9 @@ impl HermitePath {
         let h = self.levels[to].parameter - self.levels[from].parameter;
         let t = (parameter - self.levels[from].parameter) / h;
         let r = 1.0 - t;
+        if self.interpolation == Interpolation::Linear {
+            return HermiteWeights { from, to, value: [r, 0.0, t, 0.0], derivative: [-1.0 / h, 0.0, 1.0 / h, 0.0] };
+        }
         HermiteWeights {
             from,
             to,
@@ -214,7 +233,7 @@ pub fn refine_path<E: From<HermiteError>>(
     mut defect: impl FnMut(&[f64], &[f64]) -> f64,
     goal: Refinement,
 ) -> Result<(HermitePath, RefinementReport), E> {
-    let mut levels = path.levels;
+    let HermitePath { mut levels, interpolation } = path;
     let mut report = RefinementReport { solves: 0, worst_defect: 0.0, met: true };
     // Parts still to be checked, by their ends, with the defect that their parent had.
     let mut open: VecDeque<(f64, f64, f64)> =
@@ -227,7 +246,7 @@ pub fn refine_path<E: From<HermiteError>>(
             continue;
         }
         let above = levels.partition_point(|level| level.parameter < middle);
-        let part = HermitePath { levels: levels[above - 1..=above].to_vec() };
+        let part = HermitePath { levels: levels[above - 1..=above].to_vec(), interpolation };
         let mut guess = vec![0.0; part.components()];
         part.evaluate(middle, &mut guess);
         let (value, slope) = evaluate(middle, Some(&guess))?;
@@ -240,7 +259,7 @@ pub fn refine_path<E: From<HermiteError>>(
             open.extend([(start, middle, found), (middle, end, found)]);
         }
     }
-    Ok((HermitePath::new(levels)?, report))
+    Ok((HermitePath::new(levels)?.interpolated(interpolation), report))
 }
 
 #[cfg(test)]
@@ -261,6 +280,19 @@ mod tests {
 
     fn largest_difference(a: &[f64], b: &[f64]) -> f64 {
         a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+    }
+
+    #[test]
+    fn a_linear_path_is_the_chord_and_its_slope() {
+        let path = sampled(&[0.0, 0.5, 1.0], wave).interpolated(Interpolation::Linear);
+        let (mut value, mut slope) = ([0.0; 2], [0.0; 2]);
+        path.evaluate(0.7, &mut value);
+        path.derivative(0.7, &mut slope);
+        let (a, b) = (wave(0.5).0, wave(1.0).0);
+        for k in 0..2 {
+            assert!((value[k] - (0.6 * a[k] + 0.4 * b[k])).abs() < 1e-15);
+            assert!((slope[k] - 2.0 * (b[k] - a[k])).abs() < 1e-14);
+        }
     }
 
     #[test]

@@ -13,7 +13,8 @@
 //! The load is the path's parameter and nothing else is assumed of it; materials with history will march in time instead.
 
 use crate::numerics::hermite::{
-    HermiteError, HermitePath, Level, Refinement, RefinementReport, ValueAndSlope, refine_path, tangent_guess,
+    HermiteError, HermitePath, Interpolation, Level, Refinement, RefinementReport, ValueAndSlope, refine_path,
+    tangent_guess,
 };
 use crate::numerics::hyperelasticity::{Body, WorstCell};
 use crate::numerics::newton::{Equilibrium, EquilibriumError, NewtonOptions, equilibrium};
@@ -29,13 +30,22 @@ pub struct LoadPathOptions {
     pub max_levels: usize,
     /// The march gives up below this increment of the load (default 1e-3).
     pub smallest_step: f64,
+    /// What the path does between levels (default cubic).
+    pub interpolation: Interpolation,
     /// Newton's method at each level.
     pub newton: NewtonOptions,
 }
 
 impl Default for LoadPathOptions {
     fn default() -> Self {
-        Self { tolerance: 1e-6, min_levels: 5, max_levels: 129, smallest_step: 1e-3, newton: NewtonOptions::default() }
+        Self {
+            tolerance: 1e-6,
+            min_levels: 5,
+            max_levels: 129,
+            smallest_step: 1e-3,
+            interpolation: Interpolation::Cubic,
+            newton: NewtonOptions::default(),
+        }
     }
 }
 
@@ -119,7 +129,7 @@ impl LoadPath {
     /// [`LoadPathError`]: equilibrium lost (with both loads, the cell, its stretches), or an interpolant that inverts a cell.
     pub fn solve<const D: usize>(body: &Body<'_, D>, options: &LoadPathOptions) -> Result<Self, LoadPathError> {
         let mut solver = PathSolver { body, options, report: LoadPathReport::empty() };
-        let marched = HermitePath::new(solver.march()?)?;
+        let marched = HermitePath::new(solver.march()?)?.interpolated(options.interpolation);
         let (path, refinement) = solver.refine(marched)?;
         let report = solver.finish(&path, refinement)?;
         Ok(Self { path, report })

@@ -6,8 +6,11 @@ use crate::model::mechanism::Roster;
 use crate::record::manifest::Manifest;
 use crate::record::output::prepare_folder;
 use crate::scenario::load::{Loaded, Request};
+use crate::study::accuracy;
+use crate::study::chart;
+use crate::study::laboratory::Laboratory;
 use crate::study::plan::plan;
-use crate::study::run::{RunError, folder_of, read, simulate, write_figure, write_json, write_results};
+use crate::study::run::{RunError, folder_of, simulate, write_figure, write_json, write_results};
 use crate::study::seeds::{over_seeds, summarise};
 use clap::{Args, Parser, Subcommand};
 use indicatif::{ProgressBar, ProgressStyle};
@@ -45,6 +48,26 @@ enum Command {
         #[arg(long)]
         json: bool,
     },
+    /// Charts error against time for every choice a scene offers
+    Chart {
+        #[command(flatten)]
+        scene: SceneArguments,
+        /// Folder of the results [default: out/<scene>-chart]
+        #[arg(long, value_name = "DIR")]
+        out: Option<PathBuf>,
+        /// Only this factor (repeatable)
+        #[arg(long, value_name = "FACTOR", value_parser = chart::FACTORS)]
+        only: Vec<String>,
+        /// How often each setting is timed
+        #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..=1000))]
+        repetitions: u32,
+        /// Seeds for the measures of the whole scene
+        #[arg(long, value_name = "N", default_value_t = 8, value_parser = clap::value_parser!(u64).range(2..=1000))]
+        seeds: u64,
+        /// Threads to use [default: all]
+        #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1024))]
+        threads: Option<u32>,
+    },
 }
 
 /// A scenario and what is changed in it.
@@ -66,13 +89,18 @@ impl SceneArguments {
         self.scenario.clone().unwrap_or_default()
     }
 
-    fn load(&self, roster: &Roster) -> Result<Loaded, RunError> {
+    /// The scene with the keys that its accuracy asks for, and the request that gives it.
+    fn settled(&self, roster: &Roster) -> Result<(Request, Loaded), RunError> {
         let request = Request { path: self.path(), without: self.without.clone(), set: self.set.clone() };
-        let loaded = read(&request, roster)?;
+        let (request, loaded) = accuracy::settled(&request, roster)?;
         for hint in &loaded.hints {
             eprintln!("hint: {hint}");
         }
-        Ok(loaded)
+        Ok((request, loaded))
+    }
+
+    fn load(&self, roster: &Roster) -> Result<Loaded, RunError> {
+        Ok(self.settled(roster)?.1)
     }
 }
 
@@ -81,7 +109,8 @@ const EXAMPLES: &str = "Examples:
   tropism scenarios/olfactory.json --without chemotaxis  an ablation
   tropism scenarios/olfactory.json --set /seed=7 --set /populations/olfactory/count=50
   tropism scenarios/olfactory.json --seeds 20 --out out/olfactory-20
-  tropism plan scenarios/olfactory.json                  what it needs, before it runs";
+  tropism plan scenarios/olfactory.json                  what it needs, before it runs
+  tropism chart scenarios/olfactory.json --only cue_field  error against time";
 
 /// Runs the program with a roster of mechanisms: the whole of `main`, also for programs that add their own.
 pub fn run(arguments: impl IntoIterator<Item = impl Into<OsString> + Clone>, roster: Roster) -> ExitCode {
@@ -103,7 +132,11 @@ pub fn run(arguments: impl IntoIterator<Item = impl Into<OsString> + Clone>, ros
 }
 
 fn on_threads<T: Send>(cli: &Cli, work: impl FnOnce() -> Result<T, RunError> + Send) -> Result<T, RunError> {
-    let threads = cli.threads.unwrap_or(0) as usize;
+    let own = match &cli.command {
+        Some(Command::Chart { threads, .. }) => *threads,
+        _ => None,
+    };
+    let threads = own.or(cli.threads).unwrap_or(0) as usize;
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(threads)
         .build()
@@ -112,8 +145,15 @@ fn on_threads<T: Send>(cli: &Cli, work: impl FnOnce() -> Result<T, RunError> + S
 }
 
 fn execute(cli: &Cli, roster: &Roster) -> Result<ExitCode, RunError> {
-    if let Some(Command::Plan { scene, json }) = &cli.command {
-        return run_plan(scene, *json, roster);
+    match &cli.command {
+        Some(Command::Plan { scene, json }) => return run_plan(scene, *json, roster),
+        Some(Command::Chart { scene, out, only, repetitions, seeds, .. }) => {
+            let (request, _) = scene.settled(roster)?;
+            let laboratory =
+                Laboratory { request: &request, roster, repetitions: *repetitions as usize, seeds: *seeds };
+            return run_chart(&laboratory, out.as_ref(), only);
+        }
+        None => {}
     }
     let loaded = cli.scene.load(roster)?;
     let folder = folder_of(cli.out.as_ref(), &loaded.scene.name);
@@ -135,6 +175,26 @@ fn run_plan(scene: &SceneArguments, json: bool, roster: &Roster) -> Result<ExitC
         print!("{found}");
         found.notes.iter().for_each(|note| eprintln!("note: {note}"));
     }
+    Ok(ExitCode::SUCCESS)
+}
+
+fn run_chart(laboratory: &Laboratory, out: Option<&PathBuf>, only: &[String]) -> Result<ExitCode, RunError> {
+    let name = format!("{}-chart", laboratory.scene()?.scene.name);
+    let folder = folder_of(out, &name);
+    prepare_folder(&folder)?;
+    let bar = progress_bar();
+    let chart = chart::chart(laboratory, only, &|share| bar.set_position((share * 1000.0) as u64))?;
+    bar.finish_and_clear();
+    chart::report::write(&folder, &chart)?;
+    for factor in &chart.factors {
+        println!("{}\n  {}", factor.title, factor.advice);
+        for error in &factor.errors {
+            for slope in factor.slopes(error) {
+                println!("  {}: order {:.2} ({}, {} points)", error.name, slope.order, slope.method, slope.points);
+            }
+        }
+    }
+    println!("results in {}", folder.display());
     Ok(ExitCode::SUCCESS)
 }
 

@@ -21,6 +21,8 @@ pub enum Stroke {
     Marks,
     /// A line through marks.
     LineAndMarks,
+    /// A broad pale line under all others.
+    Underlay,
 }
 
 /// Points that belong together.
@@ -92,6 +94,7 @@ const FOOT_ROOM: f64 = 36.0;
 const MARK: f64 = 3.2;
 const SMALL: Font = Font::regular(theme::SMALL);
 const GRID: &str = "#e6e3de";
+const UNDERLAY: &str = "#f3d9a4";
 /// Okabe & Ito's colours, black first.
 const COLOURS: [[u8; 3]; 8] = [
     [0x1a, 0x1a, 0x1a],
@@ -192,14 +195,18 @@ impl<'a> Placed<'a> {
             title_at[0] += 17.0;
         }
         let below = write_lines(svg, &self.title, title_at, Font::bold(theme::LABEL), theme::TEXT);
-        write_lines(svg, std::slice::from_ref(&self.plot.y.label), [corner[0], below + 2.0], SMALL, theme::MUTED);
+        let beside_letter = if self.title.is_empty() { title_at[0] } else { corner[0] };
+        write_lines(svg, std::slice::from_ref(&self.plot.y.label), [beside_letter, below + 2.0], SMALL, theme::MUTED);
         let frame = Frame {
             corner: [corner[0] + LEFT_ROOM, corner[1] + self.head()],
             size: [self.width - LEFT_ROOM - 6.0, FRAME_HEIGHT],
         };
         self.draw_axes(svg, &frame);
-        for (index, series) in self.plot.series.iter().enumerate() {
-            self.draw_series(svg, &frame, index, series);
+        for under in [true, false] {
+            let of_layer = |(_, series): &(usize, &Series)| (series.stroke == Stroke::Underlay) == under;
+            for (index, series) in self.plot.series.iter().enumerate().filter(of_layer) {
+                self.draw_series(svg, &frame, index, series);
+            }
         }
         self.draw_levels(svg, &frame);
         self.draw_marks(svg, &frame);
@@ -360,7 +367,8 @@ fn draw_polylines(svg: &mut Svg, pieces: &[Vec<[f64; 2]>], colour: &str, stroke:
     if data.is_empty() {
         return;
     }
-    let mut style = vec![("d", data.as_str()), ("fill", "none"), ("stroke", colour), ("stroke-width", "1.5")];
+    let (colour, width) = if stroke == Stroke::Underlay { (UNDERLAY, "7") } else { (colour, "1.5") };
+    let mut style = vec![("d", data.as_str()), ("fill", "none"), ("stroke", colour), ("stroke-width", width)];
     if stroke == Stroke::Dashed {
         style.push(("stroke-dasharray", "5 3"));
     }

@@ -47,6 +47,8 @@ pub struct Loaded {
     pub merged: Value,
     /// What is possible but unusual.
     pub hints: Vec<Violation>,
+    /// What those who changed the scene since have to say of it; it becomes notes of its runs.
+    pub remarks: Vec<String>,
     /// The directory of the file, to which paths in blocks are relative.
     pub directory: PathBuf,
 }
@@ -89,7 +91,7 @@ pub fn load(request: &Request, blocks: &[BlockSchema]) -> Result<Loaded, Scenari
     match scene {
         Some(scene) if draft.problems.is_empty() => {
             let directory = request.path.parent().map(Path::to_path_buf).unwrap_or_default();
-            Ok(Loaded { scene, blocks, merged: draft.document, hints: draft.hints, directory })
+            Ok(Loaded { scene, blocks, merged: draft.document, hints: draft.hints, remarks: Vec::new(), directory })
         }
         _ => Err(fail(draft.problems)),
     }

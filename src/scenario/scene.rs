@@ -24,6 +24,10 @@ keys! {
         pub description: String = String::new(),
         /// The seed of every random draw.
         pub seed: u64 = 1,
+        /// Root mean square error of tips over the length of their paths, in place of mesh size, step and load levels, which
+        /// are then found by pilot runs without contact and noise; those that are given all the same are kept.
+        #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 0.5, "x-typical" = [1e-4, 0.05]))]
+        pub accuracy: Option<Factor> = None,
         /// The space axons grow in.
         pub space: Space = Space::Planar,
         /// The tissue at rest and its mesh.

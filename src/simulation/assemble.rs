@@ -70,6 +70,7 @@ pub(super) fn assemble(loaded: &Loaded, roster: &Roster) -> Result<Simulation, A
     world.insert_resource(MotionSchedule(schedules.motion));
     world.insert_resource(RightHandSide(schedules.right_hand_side));
     bring_tissue_to(&mut world, 0.0);
+    loaded.remarks.iter().for_each(|remark| world.resource_mut::<Health>().note(remark.clone()));
     let births = populate::births_in_order(&mut world);
     world.resource_mut::<Stopwatch>().lap("assembly");
     Ok(Simulation { world, step: schedules.step, births, next_birth: 0 })

@@ -96,6 +96,11 @@ impl Simulation {
         }
     }
 
+    /// Brings the tissue and what rides on it to any time (h), without a step: for a look at a moment.
+    pub fn look_at(&mut self, time: f64) {
+        bring_tissue_to(&mut self.world, time);
+    }
+
     fn is_idle(&mut self, to: u64) -> bool {
         let none_due = self.births.get(self.next_birth).is_none_or(|birth| *birth >= to);
         let mut cones = self.world.query_filtered::<&Status, With<GrowthCone>>();

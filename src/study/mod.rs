@@ -1,5 +1,8 @@
 //! Runs, and runs of runs.
 
+pub mod accuracy;
+pub mod chart;
+pub mod laboratory;
 pub mod plan;
 pub mod run;
 pub mod seeds;

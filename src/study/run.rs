@@ -18,8 +18,8 @@ use crate::simulation::{AssemblyError, Simulation};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 
-/// Resolution of `figure.png`.
-const DPI: f32 = 200.0;
+/// Resolution of pictures, dots an inch.
+pub const DPI: f32 = 200.0;
 
 /// Why there are no results, or not all of them.
 #[derive(Debug, thiserror::Error)]

@@ -81,7 +81,7 @@ const ROOMS: &[Room] = &[
     Room {
         folder: "src/study",
         rooms: &["study", "simulation", "scenario", "record", "model"],
-        packages: &["bevy_ecs", "serde", "serde_json", "rayon", "thiserror"],
+        packages: &["bevy_ecs", "nalgebra", "serde", "serde_json", "rayon", "thiserror"],
         rule: "study names simulation, scenario and record; never systems or numerics",
     },
 ];

@@ -1,0 +1,134 @@
+//! The whole scene's chart: what a coarser step or mesh changes in the measures that a biologist reads, beside what another
+//! seed changes.
+
+use super::work_precision::{ErrorKind, Factor, Seconds, short};
+use crate::record::summary::Summary;
+use crate::scenario::load::Loaded;
+use crate::study::laboratory::{Laboratory, Setting};
+use crate::study::run::{RunError, simulate};
+use std::collections::BTreeMap;
+use std::time::Instant;
+
+const STEPS: [f64; 4] = [2.0, 1.0, 0.5, 0.25];
+const MESHES: [f64; 3] = [2.0, 1.0, 0.5];
+/// Step and mesh of the reference.
+const REFERENCE: f64 = 0.25;
+const KINDS: [(&str, &str); 3] = [
+    ("hits", "change of the hit fraction"),
+    ("spread", "change of the spread at the highest height (um)"),
+    ("fascicles", "change of the number of fascicles there"),
+];
+
+/// Measures of one run: hit fraction, spread (µm), fascicles; what a scene does not have is left out of means.
+type Measures = [Option<f64>; 3];
+
+/// Change of the measures against the time for a run, over seeds.
+///
+/// # Errors
+/// A scene that cannot be assembled.
+pub fn chart(laboratory: &Laboratory, tick: &dyn Fn(f64)) -> Result<Factor, RunError> {
+    let scene = laboratory.scene()?;
+    let jobs = (STEPS.len() + MESHES.len()) as f64;
+    let (reference, _) = runs(laboratory, &setting(&scene, REFERENCE, 1.0))?;
+    let mut points = Vec::new();
+    for (done, (step, mesh)) in
+        STEPS.map(|step| (step, 1.0)).into_iter().chain(MESHES.map(|mesh| (1.0, mesh))).enumerate()
+    {
+        tick((1.0 + done as f64) / (1.0 + jobs));
+        let setting = setting(&scene, step, mesh);
+        let (found, seconds) = runs(laboratory, &setting)?;
+        points.push(setting.point(seconds, changes(&found, &reference), BTreeMap::new()));
+    }
+    let kind = |(k, (name, label)): (usize, &(&str, &str))| {
+        let values: Vec<f64> = reference.iter().filter_map(|run| run[k]).collect();
+        let spread = standard_deviation(&values);
+        let of_mean = 1.96 * spread / (values.len().max(1) as f64).sqrt();
+        let levels = [("seed to seed (SD)".to_owned(), spread), ("95 % of the mean".to_owned(), of_mean)];
+        ErrorKind { name: (*name).to_owned(), label: (*label).to_owned(), floor: 0.0, levels: levels.into() }
+    };
+    let errors: Vec<ErrorKind> = KINDS.iter().enumerate().map(kind).collect();
+    let remark = format!(
+        "Means over {} seeds, paired, against a quarter of the step; paths are chaotic, so changes below the 95 % line are those of \
+         another draw: numerical error has stopped mattering there.",
+        laboratory.seeds
+    );
+    let advice = advice(&points, &errors);
+    Ok(Factor {
+        name: "whole_scene".into(),
+        title: "The whole scene".into(),
+        knob: "step (h), or mesh size (um)".into(),
+        errors,
+        points,
+        remark,
+        advice,
+    })
+}
+
+fn setting(scene: &Loaded, step: f64, mesh: f64) -> Setting {
+    let (own_step, own_mesh) = (scene.scene.time.step.0, scene.scene.tissue.mesh_size.0);
+    let by_mesh = mesh != 1.0;
+    let words = if by_mesh {
+        format!("mesh size {} um", short(mesh * own_mesh))
+    } else {
+        format!("step {} min", short(60.0 * step * own_step))
+    };
+    Setting {
+        method: if by_mesh { "mesh size" } else { "step" }.to_owned(),
+        words,
+        knob: if by_mesh { mesh * own_mesh } else { step * own_step },
+        set: vec![format!("/time/step={:e}", step * own_step), format!("/tissue/mesh_size={:e}", mesh * own_mesh)],
+        default: step == 1.0 && mesh == 1.0,
+    }
+}
+
+fn runs(laboratory: &Laboratory, setting: &Setting) -> Result<(Vec<Measures>, Seconds), RunError> {
+    let loaded = laboratory.load(&[], &setting.set)?;
+    let (mut found, mut measured) = (Vec::new(), Vec::new());
+    for place in 0..laboratory.seeds {
+        let mut own = loaded.clone();
+        own.scene.seed += place;
+        let start = Instant::now();
+        let finished = simulate(&own, laboratory.roster, &laboratory.request.path, false, |_| {})?;
+        measured.push(start.elapsed().as_secs_f64());
+        found.push(measures(&finished.summary));
+    }
+    let seconds = Seconds::of(&measured).ok_or_else(|| RunError::Internal("a chart needs a seed".into()))?;
+    Ok((found, seconds))
+}
+
+fn measures(summary: &Summary) -> Measures {
+    let highest = summary.morphology.heights.last();
+    let fascicles = highest.map(|height| height.fascicles.count as f64);
+    [summary.morphology.hits.fraction, highest.and_then(|height| height.spread_um), fascicles]
+}
+
+/// |mean over seeds of the paired difference|.
+fn changes(found: &[Measures], reference: &[Measures]) -> BTreeMap<String, f64> {
+    let change = |k: usize| {
+        let pairs: Vec<f64> = found.iter().zip(reference).filter_map(|(a, b)| Some(a[k]? - b[k]?)).collect();
+        (pairs.iter().sum::<f64>() / pairs.len().max(1) as f64).abs()
+    };
+    KINDS.iter().enumerate().map(|(k, (name, _))| ((*name).to_owned(), change(k))).collect()
+}
+
+fn standard_deviation(values: &[f64]) -> f64 {
+    let n = values.len() as f64;
+    let mean = values.iter().sum::<f64>() / n.max(1.0);
+    (values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / (n - 1.0).max(1.0)).sqrt()
+}
+
+/// The fastest setting whose changes all lie below what the seeds leave undecided.
+fn advice(points: &[super::work_precision::Point], errors: &[ErrorKind]) -> String {
+    let below = |point: &&super::work_precision::Point| {
+        errors.iter().all(|error| point.errors[&error.name] <= error.levels["95 % of the mean"])
+    };
+    let fastest = points.iter().filter(below).min_by(|a, b| a.seconds.median.total_cmp(&b.seconds.median));
+    match fastest {
+        Some(point) => format!(
+            "The fastest setting whose measures do not differ from the reference's beyond the seeds' own 95 % is {} ({} a run).",
+            point.setting,
+            super::work_precision::time(point.seconds.median)
+        ),
+        None => "Every setting changes some measure beyond the seeds' own 95 %: take a shorter step.".to_owned(),
+    }
+}

@@ -53,6 +53,19 @@ fn the_number_of_threads_and_repetition_change_no_bit() {
 }
 
 #[test]
+fn steps_that_a_tolerance_chooses_do_not_depend_on_threads() {
+    let mut scene = scene(130, 2.0, true);
+    scene["time"]["method"] = json!("bogacki_shampine");
+    scene["time"]["step"] = json!("12 min");
+    scene["time"]["tolerance"] = json!(0.05);
+    let loaded = loaded(&scene, &systems::standard());
+    let one = on_threads(1, || bits(&loaded));
+    for threads in [1, 2, 3] {
+        assert_eq!(on_threads(threads, || bits(&loaded)), one, "{threads} threads");
+    }
+}
+
+#[test]
 fn contact_between_axons_does_not_depend_on_threads_either() {
     let loaded = loaded(&scene(130, 2.0, true), &systems::standard());
     let one = on_threads(1, || bits(&loaded));

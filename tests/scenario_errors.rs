@@ -192,7 +192,7 @@ fn each_bad_value_gets_its_own_sentence() {
         ),
         (
             r#"{"time": {"method": "bogacki_shampine", "tolerance": 0}}"#,
-            "/time/tolerance: 0 um is outside what is possible: tolerance > 0",
+            "/time/tolerance: 0 um is outside what is possible: tolerance > 0 um",
         ),
         (
             r#"{"populations": {"a": {"heading": "inner_norml"}}}"#,

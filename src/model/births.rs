@@ -82,7 +82,7 @@ type Newborn = (
 );
 
 /// Starts the cones whose birth falls into the coming step. A step that may be taken back lays no shafts: those of its
-/// newborn wait until it is accepted ([`lay_origins`]).
+/// newborn wait until it is accepted.
 pub fn give_birth(
     clock: Res<Clock>,
     tissue: Res<Tissue>,

@@ -4,10 +4,10 @@
 //! ė = κ(L̂ − (L̂·e)e): half turn – kick – half turn, with the step taken along the heading in the middle. It is of second
 //! order, keeps |v_g|, and never overshoots. The cone walks in the mesh as deformed at the midpoint.
 //!
-//! The explicit methods (the paper's "Runge–Kutta") stand in [`super::explicit`], the choice of their steps by a tolerance
+//! The explicit methods (the paper's "Runge–Kutta") stand in `explicit.rs`, the choice of their steps by a tolerance
 //! in [`super::adaptive`].
 
-use super::adaptive::adaptive_step;
+use super::adaptive::{adaptive_step, idle_until};
 use super::clock::{Clock, StageTime};
 use super::components::Status;
 use super::explicit::explicit_step;
@@ -40,6 +40,8 @@ pub fn advance(world: &mut World, cones: &mut ConeQuery, mut starts: Local<Vec<S
                 growing -= taken.sent_back;
             }
         }
+    } else {
+        idle_until(world, to);
     }
     let mut counters = world.resource_mut::<Counters>();
     counters.steps += 1;

@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::{Fnv, hash_of_states, loaded, observed, recorded};
+use common::{Fnv, ended, hash_of_states, loaded, observed, recorded};
 use serde_json::{Value, json};
 use tropism::scenario::load::Loaded;
 use tropism::study::seeds::over_seeds;
@@ -58,6 +58,7 @@ fn steps_that_a_tolerance_chooses_do_not_depend_on_threads() {
     scene["time"]["method"] = json!("bogacki_shampine");
     scene["time"]["step"] = json!("12 min");
     scene["time"]["tolerance"] = json!(0.05);
+    assert!(ended(&scene, &systems::standard()).counters().rejected_steps > 0);
     let loaded = loaded(&scene, &systems::standard());
     let one = on_threads(1, || bits(&loaded));
     for threads in [1, 2, 3] {

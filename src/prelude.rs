@@ -10,15 +10,14 @@ pub use nalgebra::{Rotation3, Vector3};
 pub use schemars::JsonSchema;
 pub use serde::{Deserialize, Serialize};
 
-pub use crate::model::brownian::BrownianTree;
-pub use crate::model::clock::{Clock, StageTime};
+pub use crate::model::brownian::{BrownianTree, HeadingPaths};
+pub use crate::model::clock::{Clock, Kinks, StageTime};
 pub use crate::model::components::{
     Axon, GrowthCone, Journey, Position, ReceptorWeights, Site, SpringState, Status, Velocity,
 };
 pub use crate::model::cones::{Cone, Cones, ConesWith};
 pub use crate::model::growth::{Growth, Population, Populations, ShaftPopulations, Targets};
 pub use crate::model::health::{Counters, Health};
-pub use crate::model::integrator::HeadingPaths;
 pub use crate::model::mechanism::{Demands, Facts, InstallError, Law, Mechanism, ModelBuilder, Roster, unknown_name};
 pub use crate::model::plan::Plan;
 pub use crate::model::quantity::{

@@ -179,6 +179,7 @@ impl Mechanism for Matrix {
         })?;
         let duration = model.world.resource::<Clock>().grid.hours(model.world.resource::<Clock>().end);
         record(model.world, &path);
+        tell_kinks(model.world, &self.load);
         let edges: Vec<String> = self.edges().into_keys().collect();
         let (unknowns, report) = (2 * model.world.resource::<Tissue>().mesh.vertex_count(), path.report());
         let why = format!(
@@ -212,6 +213,13 @@ fn record(world: &mut World, path: &LoadPath) {
         ));
     }
     world.resource_mut::<Configuration>().moves = true;
+}
+
+/// The corners of the load curve are kinks of the tissue's motion.
+fn tell_kinks(world: &mut World, load: &LoadCurve) {
+    let grid = world.resource::<Clock>().grid;
+    let mut kinks = world.get_resource_or_init::<Kinks>();
+    load.times.iter().filter(|time| time.0 >= 0.0).for_each(|time| kinks.add(grid.nearest(time.0)));
 }
 
 fn remedy(matrix: &Matrix) -> &'static str {

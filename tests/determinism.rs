@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::{Fnv, hash_of_states, loaded, observed, recorded};
+use common::{Fnv, ended, hash_of_states, loaded, observed, recorded};
 use serde_json::{Value, json};
 use tropism::scenario::load::Loaded;
 use tropism::study::seeds::over_seeds;
@@ -46,6 +46,20 @@ fn on_threads<T: Send>(threads: usize, work: impl FnOnce() -> T + Send) -> T {
 #[test]
 fn the_number_of_threads_and_repetition_change_no_bit() {
     let loaded = loaded(&scene(200, 4.0, false), &systems::standard());
+    let one = on_threads(1, || bits(&loaded));
+    for threads in [1, 2, 3] {
+        assert_eq!(on_threads(threads, || bits(&loaded)), one, "{threads} threads");
+    }
+}
+
+#[test]
+fn steps_that_a_tolerance_chooses_do_not_depend_on_threads() {
+    let mut scene = scene(130, 2.0, true);
+    scene["time"]["method"] = json!("bogacki_shampine");
+    scene["time"]["step"] = json!("12 min");
+    scene["time"]["tolerance"] = json!(0.05);
+    assert!(ended(&scene, &systems::standard()).counters().rejected_steps > 0);
+    let loaded = loaded(&scene, &systems::standard());
     let one = on_threads(1, || bits(&loaded));
     for threads in [1, 2, 3] {
         assert_eq!(on_threads(threads, || bits(&loaded)), one, "{threads} threads");

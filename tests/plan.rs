@@ -109,4 +109,10 @@ fn a_limit_that_is_passed_is_marked_and_noted() {
     assert_eq!(coarse.notes.iter().filter(|note| note.contains("or less is advised (")).count(), 3);
     let exact = planned(&changed(|scene| scene["time"] = json!({ "duration": 2, "step": 1.5 })));
     assert!(!exact.plan.margins.iter().any(|margin| margin.name.contains("strongest pull")));
+    let pair = json!({ "duration": 2, "step": 1.5, "method": "bogacki_shampine", "tolerance": "1 nm" });
+    let pair = planned(&changed(|scene| scene["time"] = pair));
+    let margin = pair.plan.margins.iter().find(|margin| margin.name.contains("strongest pull")).unwrap();
+    assert!(margin.limit == 2.512 && margin.is_passed());
+    let part = pair.plan.parts.iter().find(|part| part.name == "adaptive steps").unwrap();
+    assert!(part.kept && part.why.contains("within 0.001 um"), "{}", part.why);
 }

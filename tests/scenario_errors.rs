@@ -112,7 +112,7 @@ fn each_bad_value_gets_its_own_sentence() {
     let cases = [
         (
             r#"{"time": {"stepp": 1}}"#,
-            "/time/stepp: unknown key; did you mean `step`? (keys here: duration, step, method)",
+            "/time/stepp: unknown key; did you mean `step`? (keys here: duration, step, method, tolerance)",
         ),
         (
             r#"{"populations": {"a": {"speed": "20 um"}}}"#,
@@ -184,7 +184,15 @@ fn each_bad_value_gets_its_own_sentence() {
         (r#"{"space": "solid"}"#, r#"/space: "solid" is not allowed here (allowed: "planar")"#),
         (
             r#"{"time": {"method": "euller"}}"#,
-            r#"/time/method: "euller" is not allowed here; did you mean "euler"? (allowed: "rotation", "euler", "heun", "rk4")"#,
+            r#"/time/method: "euller" is not allowed here; did you mean "euler"? (allowed: "rotation", "euler", "heun", "rk4", "bogacki_shampine")"#,
+        ),
+        (
+            r#"{"time": {"tolerance": 1e-3}}"#,
+            r#"/time/tolerance: only the method "bogacki_shampine" chooses its steps by a tolerance; leave the key out or set the method"#,
+        ),
+        (
+            r#"{"time": {"method": "bogacki_shampine", "tolerance": 0}}"#,
+            "/time/tolerance: 0 um is outside what is possible: tolerance > 0 um",
         ),
         (
             r#"{"populations": {"a": {"heading": "inner_norml"}}}"#,
@@ -287,7 +295,7 @@ fn five_errors_are_five_problems_and_the_sixth_is_semantic() {
     let errors = scenes.load("five.json", &[], &[]).unwrap_err();
     let expected = format!(
         "{}: 6 problems
-  1. /time/stepp: unknown key; did you mean `step`? (keys here: duration, step, method)
+  1. /time/stepp: unknown key; did you mean `step`? (keys here: duration, step, method, tolerance)
   2. /time/duration: \"72\" has no unit; a time such as 72 or \"72 h\" belongs here
   3. /growth/turning_rate: \"0.9 h\" is a time; a rate such as 0.9 or \"0.9 /h\" belongs here
   4. /galvanotaxis/poisson: 0.6 is outside what is possible: 0 ≤ poisson < 0.5
@@ -355,7 +363,7 @@ fn a_problem_names_the_file_or_the_override_it_comes_from() {
         "--set time/step=1: `time/step` is not a JSON pointer; did you mean `/time/step`?",
         "/seed: \"x\" is not a whole number (in base.json)",
         "/time/step: `a` does not begin with a number (in base.json)",
-        r#"/time/method: 3 is not allowed here (allowed: "rotation", "euler", "heun", "rk4")"#,
+        r#"/time/method: 3 is not allowed here (allowed: "rotation", "euler", "heun", "rk4", "bogacki_shampine")"#,
         "/growth: 3 is not an object with the keys turning_rate, filopodium_length, filopodia_time, heading_follows, on_border (from --set)",
     ];
     assert_eq!(scenes.problems("top.json", &["/growth=3", "time/step=1"]), expected);

@@ -7,6 +7,7 @@
 //! the same path as well.
 
 use super::random::{KeyedRng, Stream};
+use bevy_ecs::prelude::Resource;
 use rand_distr::{Distribution, StandardNormal};
 
 /// Root intervals have 2^ROOT_LEVEL ticks.
@@ -19,6 +20,10 @@ pub struct BrownianTree {
     stream: Stream,
     tick: f64,
 }
+
+/// The Brownian paths of headings; absent in a scene without heading diffusion.
+#[derive(Debug, Clone, Copy, Resource)]
+pub struct HeadingPaths(pub BrownianTree);
 
 impl BrownianTree {
     /// The tree of a seed and a stream over ticks of length `tick` (h).

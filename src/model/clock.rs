@@ -58,7 +58,7 @@ impl TimeGrid {
     }
 }
 
-/// Where the run stands: the instant reached, the end, and the grid.
+/// Where the run stands: the instant reached, the end, the grid, and the step that is tried next.
 #[derive(Debug, Clone, Copy, Resource)]
 pub struct Clock {
     /// The dyadic grid.
@@ -67,22 +67,52 @@ pub struct Clock {
     pub now: u64,
     /// The last instant of the run, in ticks.
     pub end: u64,
+    /// The step that is tried next, in ticks: a power of two, at most that of the grid. Only an adaptive method changes it.
+    pub step: u64,
+    /// An instant that the coming step may not pass, in ticks; `u64::MAX` if there is none.
+    pub stop: u64,
 }
 
 impl Clock {
+    /// A clock at the start of a run that ends at `end` (ticks).
+    pub fn new(grid: TimeGrid, end: u64) -> Self {
+        Self { grid, now: 0, end, step: grid.step_ticks(), stop: u64::MAX }
+    }
+
     /// Time reached (h).
     pub fn hours(&self) -> f64 {
         self.grid.hours(self.now)
     }
 
-    /// Ticks of the step that comes next; the last one may be shorter.
+    /// Ticks of the step that comes next. It ends at a multiple of itself, so that multiples of the largest step are always
+    /// met; the one before a stop, the one after it and the last one may be shorter.
     pub fn next_step(&self) -> u64 {
-        self.grid.step_ticks().min(self.end - self.now)
+        let whole = self.step - self.now % self.step;
+        whole.min(self.end - self.now).min(self.stop - self.now)
     }
 
     /// Whether the end is reached.
     pub fn is_over(&self) -> bool {
         self.now >= self.end
+    }
+}
+
+/// Instants at which the right-hand side has a kink in time (ticks, ascending). Steps of an adaptive method end there; others
+/// take no notice.
+#[derive(Debug, Clone, Default, Resource)]
+pub struct Kinks(Vec<u64>);
+
+impl Kinks {
+    /// Adds an instant (ticks).
+    pub fn add(&mut self, instant: u64) {
+        if let Err(place) = self.0.binary_search(&instant) {
+            self.0.insert(place, instant);
+        }
+    }
+
+    /// The first one after an instant; `u64::MAX` if there is none.
+    pub fn after(&self, now: u64) -> u64 {
+        self.0.get(self.0.partition_point(|kink| *kink <= now)).copied().unwrap_or(u64::MAX)
     }
 }
 
@@ -111,5 +141,25 @@ mod tests {
             assert!(grid.tick() >= 2f64.powi(TICK_EXPONENT) && grid.tick() < 2f64.powi(TICK_EXPONENT + 1));
         }
         assert!(TimeGrid::new(0.0).is_none() && TimeGrid::new(f64::NAN).is_none());
+    }
+
+    #[test]
+    fn steps_end_at_multiples_of_themselves_and_at_stops() {
+        let grid = TimeGrid::new(1.0).unwrap();
+        let whole = grid.step_ticks();
+        let mut kinks = Kinks::default();
+        [whole + 5, 7, 7].into_iter().for_each(|kink| kinks.add(kink));
+        let mut clock = Clock { stop: kinks.after(0), step: whole / 4, ..Clock::new(grid, 2 * whole + 3) };
+        let mut met = Vec::new();
+        while !clock.is_over() {
+            clock.now += clock.next_step();
+            clock.stop = kinks.after(clock.now);
+            met.push(clock.now);
+            if clock.now == whole / 2 {
+                clock.step = whole / 2;
+            }
+        }
+        let half = whole / 2;
+        assert_eq!(met, [7, half / 2, half, whole, whole + 5, whole + half, 2 * whole, 2 * whole + 3]);
     }
 }

@@ -15,6 +15,8 @@ pub enum Method {
     Heun,
     /// The classical Runge–Kutta method; fourth order, stable for κΔt < 2.785.
     Rk4,
+    /// The embedded pair of Bogacki and Shampine in steps that a tolerance chooses; third order, stable for κΔt < 2.512.
+    BogackiShampine,
 }
 
 impl Method {
@@ -24,6 +26,7 @@ impl Method {
             Self::Rotation => None,
             Self::Euler | Self::Heun => Some(2.0),
             Self::Rk4 => Some(2.785),
+            Self::BogackiShampine => Some(2.512),
         }
     }
 }

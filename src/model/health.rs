@@ -47,6 +47,15 @@ impl Health {
         }
     }
 
+    /// The same for a note that changes as the run goes on: it takes the place of the one that begins with the same words.
+    pub fn restate(&mut self, beginning: &str, rest: impl fmt::Display) {
+        let text = format!("{beginning}{rest}");
+        match self.notes.iter_mut().find(|note| note.starts_with(beginning)) {
+            Some(note) => *note = text,
+            None => self.notes.push(text),
+        }
+    }
+
     /// The notes, in the order in which they were made.
     pub fn notes(&self) -> &[String] {
         &self.notes
@@ -58,6 +67,8 @@ impl Health {
 pub struct Counters {
     /// Steps Δt in which something grew.
     pub steps: u64,
+    /// Steps that an adaptive method tried and took back.
+    pub rejected_steps: u64,
     /// Steps of growing cones.
     pub cone_steps: u64,
     /// Evaluations of the right-hand side.

@@ -1,16 +1,19 @@
 //! The vocabulary of the world: components, resources, the schedule, the integrator, random streams, and the public seam.
 
+pub mod adaptive;
 pub mod births;
 pub mod brownian;
 pub mod carry;
 pub mod clock;
 pub mod components;
 pub mod cones;
+mod explicit;
 pub mod growth;
 pub mod health;
 pub mod integrator;
 pub mod keys;
 pub mod mechanism;
+mod movers;
 pub mod observables;
 pub mod plan;
 pub mod quantity;

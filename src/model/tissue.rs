@@ -136,6 +136,15 @@ impl Configuration {
         }
     }
 
+    /// The spatial vector F v that belongs to a reference vector v in a cell.
+    pub fn push_forward(&self, mesh: &SimplexMesh<2>, cell: u32, material: Vector3<f64>) -> Vector3<f64> {
+        if !self.moves {
+            return material;
+        }
+        let v = self.deformation_gradient(mesh, cell) * Vector2::new(material.x, material.y);
+        Vector3::new(v.x, v.y, 0.0)
+    }
+
     /// Upper bound of ‖F⁻¹‖₂ over the tissue: a spatial distance r is at most `r · inverse_stretch()` in the reference.
     pub fn inverse_stretch(&self, mesh: &SimplexMesh<2>) -> f64 {
         if !self.moves {

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use super::scene::{Births, Direction, Heading, Origin, Outline, Population, Ring, Scene, Tissue};
+use super::scene::{Births, Direction, Heading, Method, Origin, Outline, Population, Ring, Scene, Tissue};
 use super::suggest::advice;
 use crate::model::quantity::{Time, format_number};
 use crate::model::shape::{Shape, check_ring, coordinates, distance_to_segment, polygon_contains, segments};
@@ -68,6 +68,10 @@ impl Scene {
         let steps = duration.0 / step.0;
         violations.demand(steps <= MOST_STEPS, "/time/step", || {
             format!("{steps:.1e} steps of {step} fill the duration of {duration}; at most {MOST_STEPS:e} are run")
+        });
+        let adaptive = self.time.method == Method::BogackiShampine;
+        violations.demand(adaptive || self.time.tolerance.is_none(), "/time/tolerance", || {
+            "only the method \"bogacki_shampine\" chooses its steps by a tolerance; leave the key out or set the method".to_owned()
         });
     }
 }

@@ -49,11 +49,15 @@ keys! {
         /// The time simulated.
         #[schemars(extend("exclusiveMinimum" = 0.0, "x-typical" = [1.0, 240.0]))]
         pub duration: Time = Time(72.0),
-        /// The time step of the growth cones; a fifth of the reach of contact over the speed is an upper bound.
+        /// The time step of the growth cones, for `bogacki_shampine` the largest; a fifth of the reach of contact over the speed is
+        /// an upper bound.
         #[schemars(extend("exclusiveMinimum" = 0.0))]
         pub step: Time = Time(1.0 / 60.0),
         /// The integrator of the turning law.
         pub method: Method = Method::Rotation,
+        /// The largest error of a step of `bogacki_shampine`, 0.01 um by default; no other method takes it.
+        #[schemars(extend("exclusiveMinimum" = 0.0, "x-typical" = [1e-6, 1.0]))]
+        pub tolerance: Option<Length> = None,
     }
 
     /// What growth cones have in common.
@@ -90,6 +94,13 @@ keys! {
     }
 }
 
+impl TimeKeys {
+    /// The tolerance of a step, or its default.
+    pub fn tolerance(&self) -> Length {
+        self.tolerance.unwrap_or(Length(1e-2))
+    }
+}
+
 /// The space axons grow in.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
@@ -110,6 +121,8 @@ pub enum Method {
     Heun,
     /// The classical Runge–Kutta method: order 4, stable for κΔt < 2.785.
     Rk4,
+    /// The embedded pair of Bogacki and Shampine in steps that `tolerance` chooses: order 3, stable for κΔt < 2.512.
+    BogackiShampine,
 }
 
 /// Whether the rotation of the tissue turns headings.

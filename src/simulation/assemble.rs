@@ -1,9 +1,10 @@
 //! From a scenario to a world.
 
 use super::{Simulation, populate};
+use crate::model::adaptive::AdaptiveSteps;
 use crate::model::births::give_birth;
 use crate::model::carry::{carry, spin_headings};
-use crate::model::clock::{Clock, StageTime, TimeGrid};
+use crate::model::clock::{Clock, Kinks, StageTime, TimeGrid};
 use crate::model::growth::{Growth, Method, OnBorder, Population, Populations, Targets};
 use crate::model::health::{Counters, Health};
 use crate::model::integrator::{advance, bring_tissue_to};
@@ -59,11 +60,15 @@ pub(super) fn assemble(loaded: &Loaded, roster: &Roster) -> Result<Simulation, A
     world.insert_resource(clock(scene)?);
     world.insert_resource(StageTime(0.0));
     world.insert_resource(growth(scene));
+    if scene.time.method == scene::Method::BogackiShampine {
+        world.insert_resource(AdaptiveSteps::new(scene.time.tolerance().0, scene.time.duration.0));
+    }
     insert_tissue(&mut world, scene, &chosen)?;
     world.resource_mut::<Stopwatch>().lap("mesh");
     let cones = populate::spawn_cones(&mut world, scene)?;
     let mut schedules = Schedules::new();
     install(&mut world, &mut schedules, chosen, scene.seed, &cones)?;
+    stop_at_first_kink(&mut world);
     add_core_systems(&world, &mut schedules);
     plan(&mut world, loaded, roster);
     schedules.initialize(&mut world).map_err(AssemblyError::Solve)?;
@@ -98,7 +103,15 @@ fn read_blocks(loaded: &Loaded, roster: &Roster) -> Result<Vec<Chosen>, Assembly
 fn clock(scene: &Scene) -> Result<Clock, AssemblyError> {
     let grid = TimeGrid::new(scene.time.step.0)
         .ok_or_else(|| AssemblyError::at("/time/step", "a step lies between 2e-6 s and 100 years"))?;
-    Ok(Clock { grid, now: 0, end: grid.nearest(scene.time.duration.0) })
+    Ok(Clock::new(grid, grid.nearest(scene.time.duration.0)))
+}
+
+/// Lets steps of adaptive size end at the kinks that the mechanisms have told.
+fn stop_at_first_kink(world: &mut World) {
+    if world.contains_resource::<AdaptiveSteps>() {
+        let first = world.get_resource::<Kinks>().map_or(u64::MAX, |kinks| kinks.after(0));
+        world.resource_mut::<Clock>().stop = first;
+    }
 }
 
 fn growth(scene: &Scene) -> Growth {
@@ -118,6 +131,7 @@ fn growth(scene: &Scene) -> Growth {
             scene::Method::Euler => Method::Euler,
             scene::Method::Heun => Method::Heun,
             scene::Method::Rk4 => Method::Rk4,
+            scene::Method::BogackiShampine => Method::BogackiShampine,
         },
         planar: scene.space == scene::Space::Planar,
     }
@@ -213,11 +227,18 @@ fn plan(world: &mut World, loaded: &Loaded, roster: &Roster) {
     let (growth, clock) = (*world.resource::<Growth>(), *world.resource::<Clock>());
     let step = clock.grid.hours(clock.grid.step_ticks());
     let populations = world.resource::<Populations>().0.clone();
+    let tolerance = world.get_resource::<AdaptiveSteps>().map(|steps| steps.tolerance);
     let [low, high] = world.resource::<Tissue>().domain.bounding_box();
     let extent = (high[0] - low[0]).min(high[1] - low[1]);
     let mut plan = world.resource_mut::<Plan>();
     for entry in roster.entries.iter().filter(|entry| !loaded.blocks.contains_key(entry.name)) {
         plan.leave_out(entry.name, "the scene has no such block");
+    }
+    if let Some(tolerance) = tolerance {
+        plan.keep(
+            "adaptive steps",
+            format!("the error of a step stays within {tolerance} um; numbers of steps are those at the largest step"),
+        );
     }
     for Population { name, speed, .. } in populations {
         let found = derived(growth.turning_rate, growth.filopodium_length, speed, growth.filopodia_time);

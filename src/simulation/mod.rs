@@ -8,6 +8,7 @@ mod populate;
 
 pub use assemble::AssemblyError;
 
+use crate::model::adaptive::idle_until;
 use crate::model::clock::Clock;
 use crate::model::components::{GrowthCone, Status};
 use crate::model::health::{Counters, Fault, Health};
@@ -66,7 +67,7 @@ impl Simulation {
         *self.world.resource::<Counters>()
     }
 
-    /// One step Δt. A step in which no cone grows and none is born only moves the clock.
+    /// One step Δt, or less if an adaptive method needs it. A step in which no cone grows and none is born only moves the clock.
     ///
     /// # Errors
     /// The fault that ends the run; the state is that of the step's end.
@@ -74,14 +75,15 @@ impl Simulation {
         let clock = *self.world.resource::<Clock>();
         let to = clock.now + clock.next_step();
         if self.is_idle(to) {
-            self.world.resource_mut::<Clock>().now = to;
+            idle_until(&mut self.world, to);
             return Ok(());
-        }
-        while self.births.get(self.next_birth).is_some_and(|birth| *birth < to) {
-            self.next_birth += 1;
         }
         self.bring_tissue_here();
         self.step.run(&mut self.world);
+        let reached = self.world.resource::<Clock>().now;
+        while self.births.get(self.next_birth).is_some_and(|birth| *birth < reached) {
+            self.next_birth += 1;
+        }
         match self.world.resource::<Health>().fault() {
             Some(fault) => Err(fault.clone()),
             None => Ok(()),

@@ -1,10 +1,12 @@
 //! The how-to of a mechanism as a test: mechanisms from outside the crate, written with the prelude alone, run in a roster of
 //! their author's making, meet the same checks, and leave everything else as it was.
 
+mod adaptive_steps;
 mod combined_signal;
 #[path = "../common/mod.rs"]
 mod common;
 mod disc_field;
+mod front;
 mod galvanotaxis;
 mod trajectories;
 
@@ -41,7 +43,7 @@ fn the_law_of_the_mechanism_is_the_closed_form_of_a_constant_pull() {
 #[test]
 fn turning_the_field_and_the_heading_turns_the_path() {
     let angle = 37.0;
-    for method in ["rotation", "euler", "heun", "rk4"] {
+    for method in ["rotation", "euler", "heun", "rk4", "bogacki_shampine"] {
         let centre = Vector3::new(200.0, 200.0, 0.0);
         let plain = cones(ended(&field_alone(method, 120.0, 10.0, 0.1), &roster()).world())[0];
         let turned = cones(ended(&field_alone(method, 120.0 + angle, 10.0 + angle, 0.1), &roster()).world())[0];

@@ -8,7 +8,7 @@ use serde_json::{Map, Value, json};
 use tropism::prelude::*;
 use tropism::systems;
 
-fn reference(name: &str) -> Value {
+pub fn reference(name: &str) -> Value {
     let path = format!("{}/assets/reference/{name}.json", env!("CARGO_MANIFEST_DIR"));
     serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap()
 }
@@ -18,7 +18,7 @@ fn numbers(value: &Value) -> Vec<f64> {
 }
 
 /// The scene of the reference with `steps` steps between two stored times.
-fn scene(reference: &Value, method: &str, steps: usize, mesh_size: f64) -> Value {
+pub fn scene(reference: &Value, method: &str, steps: usize, mesh_size: f64) -> Value {
     let cones = &reference["cones"];
     let count = cones["x0"].as_array().unwrap().len();
     let populations: Map<String, Value> = (0..count)
@@ -40,7 +40,7 @@ fn scene(reference: &Value, method: &str, steps: usize, mesh_size: f64) -> Value
     })
 }
 
-fn with_exact_field(mut scene: Value) -> Value {
+pub fn with_exact_field(mut scene: Value) -> Value {
     let field = reference("cue_field");
     let statement = &field["statement"];
     let discs = |ligand: &str, weight: f64| -> Vec<Vec<f64>> {
@@ -68,14 +68,16 @@ fn with_own_fields(mut scene: Value) -> Value {
     scene
 }
 
-/// Largest errors of position (um) and heading (rad) over all cones and times.
-fn worst_errors(reference: &Value, scene: &Value, steps: usize) -> [f64; 2] {
+/// Largest errors of position (um) and heading (rad) over all cones and times, and what the run cost.
+pub fn worst_errors_and_cost(reference: &Value, scene: &Value) -> ([f64; 2], Counters) {
     let roster = systems::standard().with::<ExactSignal>().with::<SensedSignal>();
     let mut simulation = assembled(scene, &roster);
     let stored = &reference["cones"];
     let mut worst = [0.0f64; 2];
     for (j, time) in numbers(&stored["times"]).into_iter().enumerate() {
-        (0..steps).for_each(|_| simulation.step().unwrap());
+        while simulation.time() < time - 1e-12 {
+            simulation.step().unwrap();
+        }
         assert!((simulation.time() - time).abs() < 1e-12);
         for (i, cone) in cones(simulation.world()).iter().enumerate() {
             let place = numbers(&stored["xy"][j][i]);
@@ -86,7 +88,11 @@ fn worst_errors(reference: &Value, scene: &Value, steps: usize) -> [f64; 2] {
             worst = [worst[0].max(off), worst[1].max(turned)];
         }
     }
-    worst
+    (worst, simulation.counters())
+}
+
+fn worst_errors(reference: &Value, scene: &Value) -> [f64; 2] {
+    worst_errors_and_cost(reference, scene).0
 }
 
 #[test]
@@ -123,7 +129,7 @@ fn the_exact_field_of_this_test_is_that_of_the_reference() {
 fn runge_kutta_in_small_steps_meets_the_reference_to_its_own_error() {
     let reference = reference("trajectories");
     let allowed = 4.0 * reference["cones"]["estimated_error"].as_f64().unwrap();
-    let [place, heading] = worst_errors(&reference, &with_exact_field(scene(&reference, "rk4", 48, 0.1)), 48);
+    let [place, heading] = worst_errors(&reference, &with_exact_field(scene(&reference, "rk4", 48, 0.1)));
     println!("rk4, 48 steps an interval: {place:.2e} um, {heading:.2e} rad");
     assert!(place < allowed && heading < allowed, "{place:e} {heading:e}");
 }
@@ -137,7 +143,7 @@ fn each_method_has_its_order_in_position_and_in_heading() {
         ("rk4", 4.0, [2, 4, 8]),
         ("rotation", 2.0, [8, 16, 32]),
     ] {
-        let errors = steps.map(|n| worst_errors(&reference, &with_exact_field(scene(&reference, method, n, 0.1)), n));
+        let errors = steps.map(|n| worst_errors(&reference, &with_exact_field(scene(&reference, method, n, 0.1))));
         for (kind, what) in ["position", "heading"].into_iter().enumerate() {
             let found = fitted_order(&errors.map(|e| e[kind]));
             println!("{method}: {what}: order {found:.3}, errors {:?}", errors.map(|e| e[kind]));
@@ -151,7 +157,7 @@ fn with_the_programs_own_fields_the_error_falls_with_the_mesh_by_order_two() {
     let reference = reference("trajectories");
     let errors = [0.048, 0.024, 0.012].map(|size| {
         let scene = with_own_fields(scene(&reference, "rotation", 8, size));
-        worst_errors(&reference, &scene, 8)
+        worst_errors(&reference, &scene)
     });
     for (kind, bound) in [(0, 1e-4), (1, 5e-4)] {
         let errors = errors.map(|e| e[kind]);

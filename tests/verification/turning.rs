@@ -3,7 +3,7 @@
 use std::f64::consts::PI;
 
 use nalgebra::Vector3;
-use tropism::numerics::runge_kutta::{EULER, HEUN, RK4};
+use tropism::numerics::runge_kutta::{BOGACKI_SHAMPINE, ButcherTableau, EULER, HEUN, RK4};
 use tropism::numerics::turning::{integral_of_turn, perpendicular_part, turn};
 
 use crate::block::{array, fitted_order, number, reference};
@@ -31,7 +31,7 @@ fn angle_and_position_under_a_constant_pull_are_those_of_the_table() {
 }
 
 /// Angle after a time by an explicit method on the vector form, and the length of the heading.
-fn explicit(method: &tropism::numerics::runge_kutta::ButcherTableau, start: f64, steps: usize) -> Vector3<f64> {
+fn explicit(method: &ButcherTableau, start: f64, steps: usize) -> Vector3<f64> {
     let step = 1.0 / steps as f64;
     let mut e = heading(start);
     for _ in 0..steps {
@@ -48,7 +48,8 @@ fn explicit(method: &tropism::numerics::runge_kutta::ButcherTableau, start: f64,
 #[test]
 fn explicit_methods_approach_the_closed_form_with_their_order() {
     let exact = turn(&heading(2.0), &Vector3::x(), 2.0);
-    for method in [EULER, HEUN, RK4] {
+    let second = ButcherTableau { b: BOGACKI_SHAMPINE.embedded, order: 2, name: "embedded", ..BOGACKI_SHAMPINE };
+    for method in [EULER, HEUN, RK4, BOGACKI_SHAMPINE, second] {
         let steps = [16, 32, 64, 128];
         let errors = steps.map(|steps| (explicit(&method, 2.0, steps) - exact).norm());
         let order = fitted_order(&steps.map(|steps| 1.0 / steps as f64), &errors);

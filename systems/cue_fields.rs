@@ -2,18 +2,18 @@
 //!
 //! −DΔc + kc = Σ_j q 1_{A_j} in Ω_M(t), ∂c/∂n = 0: stationary, so c depends on the load of the tissue alone. It is solved at
 //! load levels that an error check chooses and interpolated between them by cubic Hermite polynomials, with the exact dc/ds;
-//! once in a tissue at rest; never for a cue that no mechanism reads. What cones sample is the concentration and a *recovered*,
-//! continuous gradient. Ours: numbers, lumped mass by default, sources that ride the tissue and release per current area.
+//! once in a tissue at rest; never for a cue that no mechanism reads. What cones sample is the concentration and, unless a key
+//! says otherwise, a *recovered*, continuous gradient. Ours: numbers, linear elements with lumped mass by default, sources that
+//! ride the tissue and release per current area.
 
 use super::matrix::Loading;
 use crate::model::observables::{Observable, Observables};
-use crate::numerics::hermite::{HermiteError, HermitePath, Refinement, RefinementReport, ValueAndSlope, refine};
-use crate::numerics::reaction_diffusion::{
-    Mass as MassMatrix, ReactionDiffusion, ReactionDiffusionError, Source, StationarySolver,
-};
-use crate::numerics::recovery::GradientRecovery;
+use crate::numerics::field_path::{self, FieldPath, FieldProblem, FieldSolvers, Order};
+use crate::numerics::hermite::Refinement;
+use crate::numerics::reaction_diffusion::{Mass as MassMatrix, ReactionDiffusion};
 use crate::numerics::simplex_mesh::SimplexMesh;
 use crate::prelude::*;
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -37,6 +37,26 @@ pub enum Mass {
     Consistent,
 }
 
+/// Order of the finite elements.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Element {
+    /// P1: c of order 2, its own gradient of order 1.
+    Linear,
+    /// P2: c of order 3, its own gradient of order 2, four times the unknowns on the same mesh.
+    Quadratic,
+}
+
+/// What cones sample as the gradient.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Gradient {
+    /// A continuous one, made from the values around.
+    Recovered,
+    /// The element's own, which jumps from cell to cell.
+    Raw,
+}
+
 keys! {
     /// One diffusible cue.
     pub struct Cue {
@@ -51,8 +71,13 @@ keys! {
         pub release_rate: Option<ReleaseRate> = None,
         /// What stays the same of the release while the tissue deforms. Ours.
         pub release: Release = Release::PerArea,
-        /// How degradation is integrated. Ours.
-        pub mass: Mass = Mass::Lumped,
+        /// How degradation is integrated. Absent: `lumped` for linear elements, `consistent` for quadratic ones, which know no
+        /// other. Ours.
+        pub mass: Option<Mass> = None,
+        /// Order of the finite elements. Ours.
+        pub element: Element = Element::Linear,
+        /// What cones sample as the gradient. Ours.
+        pub gradient: Gradient = Gradient::Recovered,
         /// Where it is released.
         #[schemars(length(min = 1))]
         pub sources: Vec<Shape> = Vec::new(),
@@ -69,8 +94,6 @@ pub struct Cues(pub BTreeMap<String, Cue>);
 const LEVEL_TOLERANCE: f64 = 1e-3;
 /// Cap on the load levels of a cue.
 const MOST_LEVELS: usize = 65;
-/// Values a vertex in the stored path: c, ∂c/∂x, ∂c/∂y.
-const STRIDE: usize = 3;
 
 impl Mechanism for Cues {
     const NAME: &'static str = "cues";
@@ -80,6 +103,10 @@ impl Mechanism for Cues {
         for (name, cue) in &self.0 {
             wrong.demand(!cue.sources.is_empty(), &format!("/{name}/sources"), || {
                 "a cue needs at least one source, such as {\"disc\": {\"centre\": [400, 540], \"radius\": 50}}".into()
+            });
+            let lumped = cue.element == Element::Quadratic && cue.mass == Some(Mass::Lumped);
+            wrong.demand(!lumped, &format!("/{name}/mass"), || {
+                "quadratic elements have no lumped mass (it would be zero at the vertices); leave `mass` out, or take linear elements".into()
             });
             for (i, shape) in cue.sources.iter().enumerate() {
                 if let Err(found) = shape.check() {
@@ -123,7 +150,7 @@ pub struct CueSample {
 #[derive(Debug, Resource, Default)]
 pub struct CueFields {
     names: Vec<String>,
-    paths: Vec<HermitePath>,
+    fields: Vec<FieldPath>,
     current: Vec<Vec<f64>>,
     load: Option<f64>,
 }
@@ -142,30 +169,41 @@ impl CueFields {
     /// Concentration and gradient of cue `index` at a site.
     #[inline]
     pub fn sample(&self, mesh: &SimplexMesh<2>, index: usize, site: Site) -> CueSample {
-        let values = &self.current[index];
-        let corners = mesh.cell(site.cell as usize);
+        self.sample_from(mesh, index, &self.current[index], site)
+    }
+
+    #[inline]
+    fn sample_from(&self, mesh: &SimplexMesh<2>, index: usize, values: &[f64], site: Site) -> CueSample {
         let [second, third, _] = site.weights;
-        let mut sum = [0.0; STRIDE];
-        for (weight, &corner) in [1.0 - second - third, second, third].into_iter().zip(corners) {
-            let at = corner as usize * STRIDE;
-            (0..STRIDE).for_each(|k| sum[k] += weight * values[at + k]);
-        }
-        CueSample { concentration: sum[0].max(0.0), gradient: Vector3::new(sum[1], sum[2], 0.0) }
+        let place = (site.cell as usize, [1.0 - second - third, second, third]);
+        let (c, gradient) = self.fields[index].layout.sample(mesh, values, place);
+        CueSample { concentration: c.max(0.0), gradient: Vector3::new(gradient[0], gradient[1], 0.0) }
     }
 
     fn bring_to(&mut self, load: f64) {
         if self.load != Some(load) {
-            for (path, values) in self.paths.iter().zip(&mut self.current) {
-                path.evaluate(load, values);
+            for (field, values) in self.fields.iter().zip(&mut self.current) {
+                field.path.evaluate(load, values);
             }
             self.load = Some(load);
         }
     }
 
-    fn add(&mut self, name: String, path: HermitePath) {
-        self.current.push(vec![0.0; path.components()]);
+    /// The values of a field at a load: those in use, or interpolated anew where another load was last brought.
+    fn at(&self, index: usize, load: f64) -> Cow<'_, [f64]> {
+        if self.load == Some(load) {
+            return Cow::Borrowed(&self.current[index]);
+        }
+        let path = &self.fields[index].path;
+        let mut values = vec![0.0; path.components()];
+        path.evaluate(load, &mut values);
+        Cow::Owned(values)
+    }
+
+    fn add(&mut self, name: String, field: FieldPath) {
+        self.current.push(vec![0.0; field.path.components()]);
         self.names.push(name);
-        self.paths.push(path);
+        self.fields.push(field);
     }
 }
 
@@ -174,10 +212,16 @@ fn bring_fields(configuration: Res<Configuration>, mut fields: ResMut<CueFields>
 }
 
 fn read_concentration(world: &World, index: usize) -> Vec<f64> {
-    let path = &world.resource::<CueFields>().paths[index];
-    let mut values = vec![0.0; path.components()];
-    path.evaluate(world.resource::<Configuration>().load, &mut values);
-    values.chunks_exact(STRIDE).map(|node| node[0].max(0.0)).collect()
+    let (fields, vertices) = (world.resource::<CueFields>(), world.resource::<Tissue>().mesh.vertex_count());
+    let values = fields.at(index, world.resource::<Configuration>().load);
+    fields.fields[index].layout.concentrations(&values).take(vertices).map(|c| c.max(0.0)).collect()
+}
+
+fn read_sample(world: &World, index: usize, site: Site) -> (f64, Vector3<f64>) {
+    let fields = world.resource::<CueFields>();
+    let values = fields.at(index, world.resource::<Configuration>().load);
+    let sample = fields.sample_from(&world.resource::<Tissue>().mesh, index, &values, site);
+    (sample.concentration, sample.gradient)
 }
 
 fn solve_demanded(world: &mut World) -> Result<(), InstallError> {
@@ -188,210 +232,108 @@ fn solve_demanded(world: &mut World) -> Result<(), InstallError> {
     for name in cues.keys().filter(|name| !demanded.contains(name)) {
         world.resource_mut::<Plan>().leave_out(format!("cue `{name}`"), "no mechanism reads it");
     }
-    if demanded.iter().any(|name| cues.contains_key(name)) {
-        let recovery = GradientRecovery::new(&mesh);
-        let regions: Vec<Vec<u32>> = world.resource::<Tissue>().regions.values().cloned().collect();
-        let mut solver = StationarySolver::new(&mesh, &regions).map_err(|error| failed("*", error))?;
-        for (name, cue) in demanded.iter().filter_map(|name| Some((name, cues.get(name)?))) {
-            let mut problem = CueProblem::new(world.resource::<Tissue>(), name, cue, &recovery, &mesh);
-            let (path, report) =
-                problem.solve(&mut solver, world.get_resource::<Loading>()).map_err(|error| failed(name, error))?;
-            problem.note_coarse_mesh(&mut world.resource_mut::<Health>(), name);
-            problem.note(&mut world.resource_mut::<Health>(), name, &path, report);
-            let index = fields.names.len();
-            let observable = Observable { name: name.clone(), index, read: read_concentration };
-            world.resource_mut::<Observables>().fields.push(observable);
-            let levels = path.levels().len();
-            let times = if levels == 1 { "once".to_owned() } else { format!("at {levels} load levels") };
-            let why = format!("read; {} unknowns, solved {times}", mesh.vertex_count());
-            world.resource_mut::<Plan>().keep(format!("cue `{name}`"), why);
-            fields.add(name.clone(), path);
-        }
-        let work = solver.work();
-        let mut counters = world.resource_mut::<Counters>();
-        counters.cue_solves += work.solves as u64;
-        counters.cue_factorisations += work.factorisations as u64;
+    let regions: Vec<Vec<u32>> = world.resource::<Tissue>().regions.values().cloned().collect();
+    let mut solvers = FieldSolvers::new(&mesh, regions);
+    for (name, cue) in demanded.iter().filter_map(|name| Some((name, cues.get(name)?))) {
+        let field = solve_cue(world, (name, cue), &mut solvers, &mesh)?;
+        let index = fields.names.len();
+        let observable = Observable { name: name.clone(), index, read: read_concentration, sample: read_sample };
+        world.resource_mut::<Observables>().fields.push(observable);
+        fields.add(name.clone(), field);
     }
+    let work = solvers.work();
+    let mut counters = world.resource_mut::<Counters>();
+    counters.cue_solves += work.solves as u64;
+    counters.cue_factorisations += work.factorisations as u64;
     world.insert_resource(fields);
     Ok(())
+}
+
+/// Solves one cue and notes what that took and where it falls short.
+fn solve_cue(
+    world: &mut World,
+    (name, cue): (&str, &Cue),
+    solvers: &mut FieldSolvers,
+    mesh: &SimplexMesh<2>,
+) -> Result<FieldPath, InstallError> {
+    let problem = problem(world.resource::<Tissue>(), (name, cue), mesh);
+    let goal = Refinement { tolerance: LEVEL_TOLERANCE, max_levels: MOST_LEVELS };
+    let rest = mesh.vertices();
+    let field = match world.get_resource::<Loading>() {
+        None => problem.solve(solvers, None, goal),
+        Some(loading) => problem.solve(solvers, Some(&|load| loading.configuration(rest, load)), goal),
+    }
+    .map_err(|error| failed(name, error))?;
+    let mut health = world.resource_mut::<Health>();
+    note_coarse_mesh(&mut health, name, &problem);
+    note(&mut health, name, &field);
+    let levels = field.path.levels().len();
+    let times = if levels == 1 { "once".to_owned() } else { format!("at {levels} load levels") };
+    let kind = if problem.order == Order::Quadratic { " of quadratic elements" } else { "" };
+    let why = format!("read; {} unknowns{kind}, solved {times}", field.unknowns());
+    world.resource_mut::<Plan>().keep(format!("cue `{name}`"), why);
+    Ok(field)
 }
 
 fn failed(cue: &str, error: impl std::fmt::Display) -> InstallError {
     InstallError::Solve(format!("cue `{cue}` (eq. 2): {error}"))
 }
 
-/// Why a cue's path could not be solved.
-#[derive(Debug, thiserror::Error)]
-enum CueError {
-    #[error(transparent)]
-    Field(#[from] ReactionDiffusionError),
-    #[error(transparent)]
-    Levels(#[from] HermiteError),
-}
-
-/// One cue on the tissue's mesh.
-struct CueProblem<'a> {
-    mesh: &'a SimplexMesh<2>,
-    recovery: &'a GradientRecovery<2>,
-    equation: ReactionDiffusion,
-    sources: Vec<Vec<u32>>,
-    rate: f64,
-    release: Release,
-    flipped_from: Option<f64>,
-}
-
-impl<'a> CueProblem<'a> {
-    fn new(
-        tissue: &Tissue,
-        name: &str,
-        cue: &Cue,
-        recovery: &'a GradientRecovery<2>,
-        mesh: &'a SimplexMesh<2>,
-    ) -> Self {
-        let mass = match cue.mass {
-            Mass::Lumped => MassMatrix::Lumped,
-            Mass::Consistent => MassMatrix::Consistent,
-        };
-        let equation = ReactionDiffusion { diffusion: cue.diffusion.0, degradation: cue.degradation.0, mass };
-        let cells = |i: usize| tissue.regions.get(&region(name, i)).cloned().unwrap_or_default();
-        let sources = (0..cue.sources.len()).map(cells).collect();
-        let rate = cue.release_rate.map_or(50.0 * cue.degradation.0, |q| q.0);
-        Self { mesh, recovery, equation, sources, rate, release: cue.release, flipped_from: None }
-    }
-
-    fn solve(
-        &mut self,
-        solver: &mut StationarySolver<2>,
-        loading: Option<&Loading>,
-    ) -> Result<(HermitePath, RefinementReport), CueError> {
-        let goal = Refinement { tolerance: LEVEL_TOLERANCE, max_levels: MOST_LEVELS };
-        let rest = self.mesh.vertices();
-        let Some(loading) = loading else {
-            return refine(&[0.0], |load, _| self.level(solver, load, rest, None), gradient_defect, goal);
-        };
-        let evaluate = |load: f64, _: Option<&[f64]>| {
-            let (moved, slope) = loading.configuration(rest, load);
-            self.level(solver, load, &moved, Some(&slope))
-        };
-        refine(&[0.0, 0.5, 1.0], evaluate, gradient_defect, goal)
-    }
-
-    /// c and recovered ∇c at every vertex, interleaved, with their derivatives along a motion of the vertices, if they move.
-    fn level(
-        &mut self,
-        solver: &mut StationarySolver<2>,
-        load: f64,
-        at: &[[f64; 2]],
-        motion: Option<&[[f64; 2]]>,
-    ) -> Result<ValueAndSlope, CueError> {
-        let system = solver.system(&self.equation, at)?;
-        if system.is_flipped() {
-            self.flipped_from = Some(self.flipped_from.map_or(load, |first| first.min(load)));
-        }
-        let sources = self.sources_at(at, motion);
-        let interleave = |c: &[f64], g: &[[f64; 2]]| c.iter().zip(g).flat_map(|(c, g)| [*c, g[0], g[1]]).collect();
-        let Some(motion) = motion else {
-            let c = system.solve(&sources)?;
-            let values: Vec<f64> = interleave(&c, &self.recovery.recover(at, &c, true));
-            let still = vec![0.0; values.len()];
-            return Ok((values, still));
-        };
-        let (c, slope) = system.solve_with_rate(motion, &sources)?;
-        let gradient = self.recovery.recover(at, &c, true);
-        let gradient_slope = self.gradient_slope(at, motion, &c, &slope);
-        Ok((interleave(&c, &gradient), interleave(&slope, &gradient_slope)))
-    }
-
-    fn sources_at<'s>(&'s self, at: &[[f64; 2]], motion: Option<&[[f64; 2]]>) -> Vec<Source<'s>> {
-        let source = |cells: &'s Vec<u32>| match self.release {
-            Release::PerArea => Source::new(cells, self.rate),
-            Release::Total => {
-                let rest = self.mesh.vertices();
-                let area: f64 = cells.iter().map(|&cell| self.mesh.volume(rest, cell as usize)).sum();
-                Source::of_total(self.mesh, at, motion, (cells, self.rate * area))
-            }
-        };
-        self.sources.iter().map(source).collect()
-    }
-
-    /// Derivative of the recovered gradient along the motion, by a central difference of the (smooth) recovery.
-    fn gradient_slope(&self, at: &[[f64; 2]], motion: &[[f64; 2]], c: &[f64], slope: &[f64]) -> Vec<[f64; 2]> {
-        let fastest = motion.iter().flatten().fold(0.0f64, |m, w| m.max(w.abs()));
-        if fastest == 0.0 {
-            return vec![[0.0; 2]; c.len()];
-        }
-        let step = 1e-3 / fastest;
-        let shifted = |sign: f64| {
-            let e = sign * step;
-            let x: Vec<[f64; 2]> = at.iter().zip(motion).map(|(x, w)| [x[0] + e * w[0], x[1] + e * w[1]]).collect();
-            let value: Vec<f64> = c.iter().zip(slope).map(|(c, dc)| c + e * dc).collect();
-            self.recovery.recover(&x, &value, true)
-        };
-        let (ahead, behind) = rayon::join(|| shifted(1.0), || shifted(-1.0));
-        ahead.iter().zip(&behind).map(|(a, b)| [0, 1].map(|k| (a[k] - b[k]) / (2.0 * step))).collect()
-    }
-
-    /// Warns of a mesh too coarse for the decay length ℓ = √(D/k): longer edges than ℓ/4.
-    fn note_coarse_mesh(&self, health: &mut Health, name: &str) {
-        let decay_length = (self.equation.diffusion / self.equation.degradation).sqrt();
-        let rest = self.mesh.vertices();
-        let areas = (0..self.mesh.cell_count()).map(|cell| self.mesh.volume(rest, cell)).sum::<f64>();
-        let edge = (areas / self.mesh.cell_count() as f64 * 4.0 / 3f64.sqrt()).sqrt();
-        if edge > 0.3 * decay_length {
-            health.note(format!(
-                "cue `{name}`: edges of about {edge:.3} um are long for a decay length of {decay_length:.3} um; a quarter is advised"
-            ));
-        }
-    }
-
-    fn note(&self, health: &mut Health, name: &str, path: &HermitePath, report: RefinementReport) {
-        if let Some(load) = self.flipped_from {
-            health.note(format!(
-                "cue `{name}`: by load {load:.3} the tissue's mesh is no longer Delaunay; edges are flipped for its field (vertices stay)"
-            ));
-        }
-        if !report.met {
-            let (levels, defect) = (path.levels().len(), report.worst_defect);
-            health
-                .note(format!("cue `{name}`: {levels} load levels were not enough; gradients are within {defect:.1e}"));
-        }
-        let nodes = path.levels().iter().flat_map(|level| level.value.iter().step_by(STRIDE));
-        let lowest = nodes.fold(0.0f64, |lowest, c| lowest.min(*c));
-        if lowest < 0.0 {
-            health.note(format!(
-                "cue `{name}`: the discrete concentration falls to {lowest:.2e} nM; zero is sensed there"
-            ));
-        }
+/// The cue as a problem of numerics.
+fn problem<'m>(tissue: &Tissue, (name, cue): (&str, &Cue), mesh: &'m SimplexMesh<2>) -> FieldProblem<'m> {
+    let (order, usual) = match cue.element {
+        Element::Linear => (Order::Linear, Mass::Lumped),
+        Element::Quadratic => (Order::Quadratic, Mass::Consistent),
+    };
+    let mass = match cue.mass.unwrap_or(usual) {
+        Mass::Lumped => MassMatrix::Lumped,
+        Mass::Consistent => MassMatrix::Consistent,
+    };
+    let gradient = match cue.gradient {
+        Gradient::Recovered => field_path::Gradient::Recovered,
+        Gradient::Raw => field_path::Gradient::Raw,
+    };
+    let cells = |i: usize| tissue.regions.get(&region(name, i)).cloned().unwrap_or_default();
+    FieldProblem {
+        mesh,
+        equation: ReactionDiffusion { diffusion: cue.diffusion.0, degradation: cue.degradation.0, mass },
+        order,
+        gradient,
+        sources: (0..cue.sources.len()).map(cells).collect(),
+        release_rate: cue.release_rate.map_or(50.0 * cue.degradation.0, |q| q.0),
+        keeps_total: cue.release == Release::Total,
     }
 }
 
-/// A relative gradient below this (1/µm) is none: a thousandth of the least that is sensed, 1 % per 10 µm. In a convex corner the
-/// recovered gradient is zero to round-off, and round-off has no relative error to speak of.
-const FLAT: f64 = 1e-6;
-
-/// Root mean square over the vertices of the gradient's relative error.
-fn gradient_defect(interpolated: &[f64], exact: &[f64]) -> f64 {
-    let (mut sum, mut count) = (0.0, 0.0f64);
-    for (a, b) in interpolated.chunks_exact(STRIDE).zip(exact.chunks_exact(STRIDE)) {
-        let size = b[1].hypot(b[2]).max(FLAT * b[0].abs());
-        if size > 0.0 {
-            sum += ((a[1] - b[1]).hypot(a[2] - b[2]) / size).powi(2).min(1.0);
-            count += 1.0;
-        }
+/// Warns of a mesh too coarse for the decay length ℓ = √(D/k): edges much longer than ℓ/4, or ℓ/2 of quadratic elements, whose
+/// nodes are twice as close.
+fn note_coarse_mesh(health: &mut Health, name: &str, problem: &FieldProblem) {
+    let decay_length = (problem.equation.diffusion / problem.equation.degradation).sqrt();
+    let rest = problem.mesh.vertices();
+    let areas = (0..problem.mesh.cell_count()).map(|cell| problem.mesh.volume(rest, cell)).sum::<f64>();
+    let edge = (areas / problem.mesh.cell_count() as f64 * 4.0 / 3f64.sqrt()).sqrt();
+    let (longest, advised) = if problem.order == Order::Linear { (0.3, "a quarter") } else { (0.6, "a half") };
+    if edge > longest * decay_length {
+        health.note(format!(
+            "cue `{name}`: edges of about {edge:.3} um are long for a decay length of {decay_length:.3} um; {advised} is advised"
+        ));
     }
-    (sum / count.max(1.0)).sqrt()
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn round_off_in_a_corner_is_no_defect_and_a_wrong_gradient_is() {
-        let exact = [1.0, 1e-20, 0.0, 1.0, 0.01, 0.0];
-        let rounded = [1.0, -3e-20, 1e-20, 1.0, 0.01, 0.0];
-        assert!(gradient_defect(&rounded, &exact) < 1e-12);
-        let wrong = [1.0, 0.0, 0.0, 1.0, 0.01, 0.002];
-        assert!((gradient_defect(&wrong, &exact) - 0.2 / 2f64.sqrt()).abs() < 1e-12);
+fn note(health: &mut Health, name: &str, field: &FieldPath) {
+    let (path, report) = (&field.path, field.report);
+    if let Some(load) = field.flipped_from {
+        health.note(format!(
+            "cue `{name}`: by load {load:.3} the tissue's mesh is no longer Delaunay; edges are flipped for its field (vertices stay)"
+        ));
+    }
+    if !report.met {
+        let (levels, defect) = (path.levels().len(), report.worst_defect);
+        health.note(format!("cue `{name}`: {levels} load levels were not enough; gradients are within {defect:.1e}"));
+    }
+    let nodes = path.levels().iter().flat_map(|level| field.layout.concentrations(&level.value));
+    let lowest = nodes.fold(0.0f64, |lowest, c| lowest.min(c));
+    if lowest < 0.0 {
+        health.note(format!("cue `{name}`: the discrete concentration falls to {lowest:.2e} nM; zero is sensed there"));
     }
 }

@@ -1,6 +1,8 @@
 //! Fields that pictures may show: providers say what they have, mechanisms say what it does to cones.
 
+use super::components::Site;
 use bevy_ecs::prelude::{Resource, World};
+use nalgebra::Vector3;
 use std::collections::BTreeMap;
 
 /// What a field does to the cones that sense it.
@@ -15,6 +17,10 @@ pub enum Effect {
 /// Nodal values of a field in the world's present configuration.
 pub type FieldReader = fn(&World, usize) -> Vec<f64>;
 
+/// Value of a field (nM for a concentration) and its spatial gradient (per µm) at a material site, in the world's present
+/// configuration.
+pub type FieldSampler = fn(&World, usize, Site) -> (f64, Vector3<f64>);
+
 /// One field on the vertices of the tissue's mesh.
 #[derive(Debug, Clone)]
 pub struct Observable {
@@ -24,6 +30,8 @@ pub struct Observable {
     pub index: usize,
     /// Reads its nodal values.
     pub read: FieldReader,
+    /// Reads value and gradient at a site (see [`crate::model::tissue::Tissue::locate`]), as cones sense them.
+    pub sample: FieldSampler,
 }
 
 /// All fields of a scene that can be shown, and what they do.

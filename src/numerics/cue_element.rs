@@ -31,7 +31,7 @@ pub struct ReactionDiffusion {
 /// Geometry of one cell.
 pub(crate) struct Element<'a, const D: usize> {
     pub(crate) corners: &'a [u32],
-    gradients: [[f64; D]; 4],
+    pub(crate) gradients: [[f64; D]; 4],
     pub(crate) volume: f64,
 }
 

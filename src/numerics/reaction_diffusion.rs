@@ -77,13 +77,13 @@ pub enum ReactionDiffusionError {
     )]
     Degradation(f64),
     /// A list does not fit the mesh.
-    #[error("{what} has {given} entries for {wanted} vertices")]
+    #[error("{what} has {given} entries where {wanted} are needed")]
     Length {
         /// Which list.
         what: &'static str,
         /// Its entries.
         given: usize,
-        /// Vertices of the mesh.
+        /// One for each vertex, or node.
         wanted: usize,
     },
     /// A source names a cell that does not exist.
@@ -190,7 +190,7 @@ impl<'m, const D: usize> StationarySolver<'m, D> {
         'm: 'a,
     {
         check_law(law)?;
-        check_length("coordinates", coordinates.len(), self.mesh)?;
+        check_length("coordinates", coordinates.len(), self.mesh.vertex_count())?;
         check_volumes(self.mesh, coordinates)?;
         let (flipped, pattern) = match self.topology(coordinates)? {
             Some((mesh, pattern)) => (Some(mesh), pattern),
@@ -303,7 +303,7 @@ impl<const D: usize> StationarySystem<'_, D> {
     /// # Errors
     /// A load of the wrong length; no scratch memory.
     pub fn solve_load(&self, mut load: Vec<f64>) -> Result<Vec<f64>, ReactionDiffusionError> {
-        check_length("the load", load.len(), self.original)?;
+        check_length("the load", load.len(), self.original.vertex_count())?;
         self.factor.solve(&mut load)?;
         self.solves.fetch_add(1, Ordering::Relaxed);
         Ok(load)
@@ -326,7 +326,7 @@ impl<const D: usize> StationarySystem<'_, D> {
         velocity: &[[f64; D]],
         sources: &[Source],
     ) -> Result<(Vec<f64>, Vec<f64>), ReactionDiffusionError> {
-        check_length("the velocity", velocity.len(), self.original)?;
+        check_length("the velocity", velocity.len(), self.original.vertex_count())?;
         let field = self.solve(sources)?;
         let mut rate = vec![0.0; field.len()];
         self.for_source_cells(sources, |element, source| {
@@ -345,7 +345,7 @@ impl<const D: usize> StationarySystem<'_, D> {
     /// # Errors
     /// Those of [`Self::load`]; a field of the wrong length.
     pub fn budget(&self, field: &[f64], sources: &[Source]) -> Result<Budget, ReactionDiffusionError> {
-        check_length("the field", field.len(), self.original)?;
+        check_length("the field", field.len(), self.original.vertex_count())?;
         let mesh = if self.law.mass == Mass::Lumped { self.original } else { self.mesh() };
         let content: f64 = (0..mesh.cell_count())
             .map(|cell| {
@@ -377,7 +377,7 @@ impl<const D: usize> StationarySystem<'_, D> {
     }
 }
 
-fn check_law(law: &ReactionDiffusion) -> Result<(), ReactionDiffusionError> {
+pub(crate) fn check_law(law: &ReactionDiffusion) -> Result<(), ReactionDiffusionError> {
     if !(law.diffusion > 0.0 && law.diffusion.is_finite()) {
         return Err(ReactionDiffusionError::Diffusion(law.diffusion));
     }
@@ -387,16 +387,11 @@ fn check_law(law: &ReactionDiffusion) -> Result<(), ReactionDiffusionError> {
     Ok(())
 }
 
-fn check_length<const D: usize>(
-    what: &'static str,
-    given: usize,
-    mesh: &SimplexMesh<D>,
-) -> Result<(), ReactionDiffusionError> {
-    let wanted = mesh.vertex_count();
+pub(crate) fn check_length(what: &'static str, given: usize, wanted: usize) -> Result<(), ReactionDiffusionError> {
     if given == wanted { Ok(()) } else { Err(ReactionDiffusionError::Length { what, given, wanted }) }
 }
 
-fn check_volumes<const D: usize>(
+pub(crate) fn check_volumes<const D: usize>(
     mesh: &SimplexMesh<D>,
     coordinates: &[[f64; D]],
 ) -> Result<(), ReactionDiffusionError> {

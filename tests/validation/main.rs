@@ -4,6 +4,7 @@ mod births;
 mod borders;
 #[path = "../common/mod.rs"]
 mod common;
+mod cue_elements;
 mod fixed_pull;
 mod noise;
 mod tissue;

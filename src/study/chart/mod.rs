@@ -5,6 +5,7 @@
 //! estimated and drawn as a floor.
 
 mod cones;
+mod cue_field;
 mod matrix;
 mod neighbours;
 pub mod report;
@@ -16,7 +17,7 @@ use super::run::RunError;
 use work_precision::Factor;
 
 /// Names of the factors, as `--only` takes them.
-pub const FACTORS: [&str; 4] = ["matrix", "cones", "neighbours", "whole_scene"];
+pub const FACTORS: [&str; 5] = ["cue_field", "matrix", "cones", "neighbours", "whole_scene"];
 
 /// Error against time for the choices of a scene.
 #[derive(Debug, Clone, PartialEq)]
@@ -42,6 +43,7 @@ pub fn chart(laboratory: &Laboratory, only: &[String], tick: &dyn Fn(f64)) -> Re
     for (done, name) in wanted.iter().enumerate() {
         let tick = |share: f64| tick((done as f64 + share) / wanted.len() as f64);
         match *name {
+            "cue_field" => factors.extend(cue_field::chart(laboratory, &tick)?),
             "matrix" => factors.extend(matrix::charts(laboratory, &tick)?),
             "cones" => factors.extend(cones::charts(laboratory, &tick)?),
             "neighbours" => factors.extend(neighbours::chart(laboratory, &tick)?),

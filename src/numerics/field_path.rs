@@ -1,0 +1,269 @@
+//! A stationary field along the load of its tissue: solved at levels that an error check chooses, cubic Hermite between them.
+//!
+//! One vector a level holds c and ∇c ([`FieldLayout`]), another their exact derivatives along the load; only that of the gradient
+//! recovered from linear elements is a central difference of the (smooth) recovery.
+
+use std::sync::Arc;
+
+use crate::numerics::element_gradient::{MovingField, averaged_gradients, corner_gradients, linear_gradients};
+use crate::numerics::field_layout::FieldLayout;
+use crate::numerics::hermite::{HermiteError, HermitePath, Refinement, RefinementReport, ValueAndSlope, refine};
+use crate::numerics::quadratic_field::QuadraticSolver;
+use crate::numerics::reaction_diffusion::{
+    ReactionDiffusion, ReactionDiffusionError, Source, StationarySolver, WorkCount,
+};
+use crate::numerics::recovery::GradientRecovery;
+use crate::numerics::simplex_mesh::SimplexMesh;
+
+/// A relative gradient below this (1/µm) is none: a thousandth of the least that is sensed, 1 % per 10 µm. In a convex corner the
+/// recovered gradient is zero to round-off, and round-off has no relative error to speak of.
+const FLAT: f64 = 1e-6;
+
+/// Order of the elements of a field.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Order {
+    /// P1.
+    Linear,
+    /// P2.
+    Quadratic,
+}
+
+/// How the gradient of a field is made from its nodal values.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Gradient {
+    /// Continuous: local quadratic fits of linear elements, volume-weighted means of quadratic ones.
+    Recovered,
+    /// The element's own, which jumps from cell to cell.
+    Raw,
+}
+
+/// Why a field's path could not be solved.
+#[derive(Debug, thiserror::Error)]
+pub enum FieldPathError {
+    /// A level could not be solved.
+    #[error(transparent)]
+    Field(#[from] ReactionDiffusionError),
+    /// The levels make no path.
+    #[error(transparent)]
+    Levels(#[from] HermiteError),
+}
+
+/// Vertex coordinates (µm) at a load and their derivative with respect to it.
+pub type Configurations<'a> = &'a dyn Fn(f64) -> (Vec<[f64; 2]>, Vec<[f64; 2]>);
+
+/// The solvers of one mesh, set up when a field first needs them.
+#[derive(Debug)]
+pub struct FieldSolvers<'m> {
+    mesh: &'m SimplexMesh<2>,
+    regions: Vec<Vec<u32>>,
+    linear: Option<(StationarySolver<'m, 2>, GradientRecovery<2>)>,
+    quadratic: Option<QuadraticSolver<'m, 2>>,
+}
+
+impl<'m> FieldSolvers<'m> {
+    /// None yet, on `mesh`; `regions` are all that are ever a source.
+    pub fn new(mesh: &'m SimplexMesh<2>, regions: Vec<Vec<u32>>) -> Self {
+        Self { mesh, regions, linear: None, quadratic: None }
+    }
+
+    /// Factorisations and solves done so far.
+    pub fn work(&self) -> WorkCount {
+        let linear = self.linear.as_ref().map(|(solver, _)| solver.work());
+        let quadratic = self.quadratic.as_ref().map(QuadraticSolver::work);
+        let none = WorkCount { symbolic: 0, factorisations: 0, solves: 0 };
+        linear.into_iter().chain(quadratic).fold(none, |sum, work| WorkCount {
+            symbolic: sum.symbolic + work.symbolic,
+            factorisations: sum.factorisations + work.factorisations,
+            solves: sum.solves + work.solves,
+        })
+    }
+
+    fn linear(&mut self) -> Result<&mut (StationarySolver<'m, 2>, GradientRecovery<2>), ReactionDiffusionError> {
+        match &mut self.linear {
+            Some(known) => Ok(known),
+            none => {
+                let solver = StationarySolver::new(self.mesh, &self.regions)?;
+                Ok(none.insert((solver, GradientRecovery::new(self.mesh))))
+            }
+        }
+    }
+
+    fn quadratic(&mut self) -> Result<&mut QuadraticSolver<'m, 2>, ReactionDiffusionError> {
+        match &mut self.quadratic {
+            Some(known) => Ok(known),
+            none => Ok(none.insert(QuadraticSolver::new(self.mesh)?)),
+        }
+    }
+}
+
+/// One field on a mesh.
+#[derive(Debug)]
+pub struct FieldProblem<'m> {
+    /// The mesh, in the reference configuration.
+    pub mesh: &'m SimplexMesh<2>,
+    /// D, k and (of linear elements) the mass.
+    pub equation: ReactionDiffusion,
+    /// Order of the elements.
+    pub order: Order,
+    /// What is sampled as the gradient.
+    pub gradient: Gradient,
+    /// The cells of each source.
+    pub sources: Vec<Vec<u32>>,
+    /// Release q (nM/h), at rest.
+    pub release_rate: f64,
+    /// Whether q times the source's area is kept while the tissue deforms; else q is.
+    pub keeps_total: bool,
+}
+
+/// A solved field.
+#[derive(Debug)]
+pub struct FieldPath {
+    /// c and ∇c along the load.
+    pub path: HermitePath,
+    /// What stands where in it.
+    pub layout: FieldLayout,
+    /// What the choice of levels came to.
+    pub report: RefinementReport,
+    /// The least load at which edges were flipped (linear elements only).
+    pub flipped_from: Option<f64>,
+}
+
+impl FieldPath {
+    /// Unknowns of a solve.
+    pub fn unknowns(&self) -> usize {
+        self.layout.concentrations(&self.path.levels()[0].value).count()
+    }
+}
+
+impl FieldProblem<'_> {
+    /// Solves the field at rest, or along the `configurations` for loads in [0, 1].
+    ///
+    /// # Errors
+    /// The first level that cannot be solved.
+    pub fn solve(
+        &self,
+        solvers: &mut FieldSolvers,
+        configurations: Option<Configurations>,
+        goal: Refinement,
+    ) -> Result<FieldPath, FieldPathError> {
+        let layout = self.layout(solvers)?;
+        let mut flipped_from: Option<f64> = None;
+        let defect = |a: &[f64], b: &[f64]| layout.gradient_defect(self.mesh, (a, b), FLAT);
+        let mut level = |load: f64, at: &[[f64; 2]], motion: Option<&[[f64; 2]]>| {
+            let (found, flipped) = match self.order {
+                Order::Linear => self.linear_level(solvers, &layout, at, motion)?,
+                Order::Quadratic => (self.quadratic_level(solvers, &layout, at, motion)?, false),
+            };
+            if flipped {
+                flipped_from = Some(flipped_from.map_or(load, |first| first.min(load)));
+            }
+            Ok::<_, FieldPathError>(found)
+        };
+        let (path, report) = match configurations {
+            None => refine(&[0.0], |load, _| level(load, self.mesh.vertices(), None), defect, goal)?,
+            Some(configurations) => {
+                let evaluate = |load: f64, _: Option<&[f64]>| {
+                    let (moved, slope) = configurations(load);
+                    level(load, &moved, Some(&slope))
+                };
+                refine(&[0.0, 0.5, 1.0], evaluate, defect, goal)?
+            }
+        };
+        Ok(FieldPath { path, layout, report, flipped_from })
+    }
+
+    fn layout(&self, solvers: &mut FieldSolvers) -> Result<FieldLayout, ReactionDiffusionError> {
+        Ok(match (self.order, self.gradient) {
+            (Order::Linear, Gradient::Recovered) => FieldLayout::Vertices,
+            (Order::Linear, Gradient::Raw) => FieldLayout::Cells(self.mesh.vertex_count()),
+            (Order::Quadratic, Gradient::Recovered) => FieldLayout::Nodes(Arc::clone(solvers.quadratic()?.nodes())),
+            (Order::Quadratic, Gradient::Raw) => FieldLayout::Corners(Arc::clone(solvers.quadratic()?.nodes())),
+        })
+    }
+
+    /// c and ∇c, with their derivatives along a motion of the vertices, if they move; and whether edges were flipped.
+    fn linear_level(
+        &self,
+        solvers: &mut FieldSolvers,
+        layout: &FieldLayout,
+        at: &[[f64; 2]],
+        motion: Option<&[[f64; 2]]>,
+    ) -> Result<(ValueAndSlope, bool), ReactionDiffusionError> {
+        let (solver, recovery) = solvers.linear()?;
+        let system = solver.system(&self.equation, at)?;
+        let sources = self.sources_at(at, motion);
+        let (c, slope) = match motion {
+            Some(motion) => system.solve_with_rate(motion, &sources)?,
+            None => (system.solve(&sources)?, vec![0.0; at.len()]),
+        };
+        let (gradient, gradient_slope) = match (self.gradient, motion) {
+            (Gradient::Raw, _) => {
+                let still = vec![[0.0; 2]; at.len()];
+                let velocity = motion.unwrap_or(&still);
+                linear_gradients(self.mesh, &MovingField { coordinates: at, velocity, values: &c, rates: &slope })
+            }
+            (Gradient::Recovered, None) => (recovery.recover(at, &c, true), vec![[0.0; 2]; at.len()]),
+            (Gradient::Recovered, Some(motion)) => {
+                (recovery.recover(at, &c, true), recovered_slope(recovery, (at, motion), (&c, &slope)))
+            }
+        };
+        let found = (layout.pack(&c, &gradient), layout.pack(&slope, &gradient_slope));
+        Ok((found, system.is_flipped()))
+    }
+
+    fn quadratic_level(
+        &self,
+        solvers: &mut FieldSolvers,
+        layout: &FieldLayout,
+        at: &[[f64; 2]],
+        motion: Option<&[[f64; 2]]>,
+    ) -> Result<ValueAndSlope, ReactionDiffusionError> {
+        let solver = solvers.quadratic()?;
+        let system = solver.system(&self.equation, at)?;
+        let sources = self.sources_at(at, motion);
+        let (values, rates) = match motion {
+            Some(motion) => system.solve_with_rate(motion, &sources)?,
+            None => (system.solve(&sources)?, vec![0.0; solver.nodes().count()]),
+        };
+        let still = vec![[0.0; 2]; at.len()];
+        let field = MovingField { coordinates: at, velocity: motion.unwrap_or(&still), values: &values, rates: &rates };
+        let (gradient, gradient_slope) = match self.gradient {
+            Gradient::Recovered => averaged_gradients(self.mesh, solver.nodes(), &field),
+            Gradient::Raw => corner_gradients(self.mesh, solver.nodes(), &field),
+        };
+        Ok((layout.pack(&values, &gradient), layout.pack(&rates, &gradient_slope)))
+    }
+
+    fn sources_at<'s>(&'s self, at: &[[f64; 2]], motion: Option<&[[f64; 2]]>) -> Vec<Source<'s>> {
+        let source = |cells: &'s Vec<u32>| {
+            if !self.keeps_total {
+                return Source::new(cells, self.release_rate);
+            }
+            let rest = self.mesh.vertices();
+            let area: f64 = cells.iter().map(|&cell| self.mesh.volume(rest, cell as usize)).sum();
+            Source::of_total(self.mesh, at, motion, (cells, self.release_rate * area))
+        };
+        self.sources.iter().map(source).collect()
+    }
+}
+
+/// Derivative of the recovered gradient along the motion, by a central difference of the (smooth) recovery.
+fn recovered_slope(
+    recovery: &GradientRecovery<2>,
+    (at, motion): (&[[f64; 2]], &[[f64; 2]]),
+    (c, slope): (&[f64], &[f64]),
+) -> Vec<[f64; 2]> {
+    let fastest = motion.iter().flatten().fold(0.0f64, |m, w| m.max(w.abs()));
+    if fastest == 0.0 {
+        return vec![[0.0; 2]; c.len()];
+    }
+    let step = 1e-3 / fastest;
+    let shifted = |sign: f64| {
+        let e = sign * step;
+        let x: Vec<[f64; 2]> = at.iter().zip(motion).map(|(x, w)| [x[0] + e * w[0], x[1] + e * w[1]]).collect();
+        let value: Vec<f64> = c.iter().zip(slope).map(|(c, dc)| c + e * dc).collect();
+        recovery.recover(&x, &value, true)
+    };
+    let (ahead, behind) = rayon::join(|| shifted(1.0), || shifted(-1.0));
+    ahead.iter().zip(&behind).map(|(a, b)| [0, 1].map(|k| (a[k] - b[k]) / (2.0 * step))).collect()
+}

@@ -20,6 +20,7 @@ pub mod manifest;
 mod markers;
 pub mod measures;
 pub mod output;
+pub mod plot;
 pub mod png;
 pub mod polyline;
 pub mod raster;

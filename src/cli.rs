@@ -9,6 +9,7 @@ use crate::scenario::load::{Loaded, Request};
 use crate::study::plan::plan;
 use crate::study::run::{RunError, folder_of, read, simulate, write_figure, write_json, write_results};
 use crate::study::seeds::{over_seeds, summarise};
+use crate::study::stability::Stability;
 use clap::{Args, Parser, Subcommand};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::ffi::OsString;
@@ -44,6 +45,12 @@ enum Command {
         /// Print the plan as JSON
         #[arg(long)]
         json: bool,
+    },
+    /// Maps where methods fail, and what the program then does: numbers and a figure a map
+    Stability {
+        /// Folder of the results
+        #[arg(long, value_name = "DIR", default_value = "out/stability")]
+        out: PathBuf,
     },
 }
 
@@ -81,7 +88,8 @@ const EXAMPLES: &str = "Examples:
   tropism scenarios/olfactory.json --without chemotaxis  an ablation
   tropism scenarios/olfactory.json --set /seed=7 --set /populations/olfactory/count=50
   tropism scenarios/olfactory.json --seeds 20 --out out/olfactory-20
-  tropism plan scenarios/olfactory.json                  what it needs, before it runs";
+  tropism plan scenarios/olfactory.json                  what it needs, before it runs
+  tropism stability                                      where methods fail, into out/stability";
 
 /// Runs the program with a roster of mechanisms: the whole of `main`, also for programs that add their own.
 pub fn run(arguments: impl IntoIterator<Item = impl Into<OsString> + Clone>, roster: Roster) -> ExitCode {
@@ -112,8 +120,10 @@ fn on_threads<T: Send>(cli: &Cli, work: impl FnOnce() -> Result<T, RunError> + S
 }
 
 fn execute(cli: &Cli, roster: &Roster) -> Result<ExitCode, RunError> {
-    if let Some(Command::Plan { scene, json }) = &cli.command {
-        return run_plan(scene, *json, roster);
+    match &cli.command {
+        Some(Command::Plan { scene, json }) => return run_plan(scene, *json, roster),
+        Some(Command::Stability { out }) => return run_stability(out, roster),
+        None => {}
     }
     let loaded = cli.scene.load(roster)?;
     let folder = folder_of(cli.out.as_ref(), &loaded.scene.name);
@@ -135,6 +145,16 @@ fn run_plan(scene: &SceneArguments, json: bool, roster: &Roster) -> Result<ExitC
         print!("{found}");
         found.notes.iter().for_each(|note| eprintln!("note: {note}"));
     }
+    Ok(ExitCode::SUCCESS)
+}
+
+fn run_stability(folder: &std::path::Path, roster: &Roster) -> Result<ExitCode, RunError> {
+    prepare_folder(folder)?;
+    let bar = progress_bar();
+    let maps = Stability::compute(roster, |share| bar.set_position((share * 1000.0) as u64))?;
+    bar.finish_and_clear();
+    maps.write(folder)?;
+    println!("results in {}", folder.display());
     Ok(ExitCode::SUCCESS)
 }
 

@@ -42,9 +42,9 @@ pub struct CueSeries {
     pub mesh: &'static str,
     /// `consistent` or `lumped`.
     pub mass: &'static str,
-    /// The first k h²/D of the map at which some edge has the wrong sign; `null` if none.
+    /// The k h²/D from which some edge has the wrong sign; `null` if none.
     pub wrong_sign_from: Option<f64>,
-    /// The first k h²/D of the map with a concentration below zero by more than round-off; `null` if none.
+    /// The k h²/D from which there is a concentration below zero by more than round-off; `null` if none.
     pub negative_from: Option<f64>,
     /// Its points.
     pub points: Vec<CuePoint>,
@@ -84,14 +84,32 @@ fn over_stiffness(lattice: &Lattice, mass: Mass, count: usize) -> Result<CueSeri
     let points: Result<Vec<_>, RunError> =
         logarithmic([0.1, 1e4], count).into_par_iter().map(|stiffness| solve(lattice, mass, stiffness)).collect();
     let points = points?;
-    let first = |wrong: &dyn Fn(&CuePoint) -> bool| points.iter().find(|p| wrong(p)).map(|p| p.stiffness);
+    let first = |wrong: &dyn Fn(&CuePoint) -> bool| onset(lattice, mass, &points, wrong);
     Ok(CueSeries {
         mesh: lattice.name,
         mass: if mass == Mass::Lumped { "lumped" } else { "consistent" },
-        wrong_sign_from: first(&|point| point.wrong_edges > 0),
-        negative_from: first(&|point| point.smallest < -1e-12),
+        wrong_sign_from: first(&|point| point.wrong_edges > 0)?,
+        negative_from: first(&|point| point.smallest < -1e-12)?,
         points,
     })
+}
+
+/// The first k h²/D that is wrong, by bisection between points; the lowest of the map if all are.
+fn onset(
+    lattice: &Lattice,
+    mass: Mass,
+    points: &[CuePoint],
+    wrong: &dyn Fn(&CuePoint) -> bool,
+) -> Result<Option<f64>, RunError> {
+    let Some(first) = points.iter().position(wrong) else { return Ok(None) };
+    let mut high = points[first].stiffness;
+    let Some(before) = first.checked_sub(1) else { return Ok(Some(high)) };
+    let mut low = points[before].stiffness;
+    while high / low > 1.0 + 1e-6 {
+        let middle = (low * high).sqrt();
+        if wrong(&solve(lattice, mass, middle)?) { high = middle } else { low = middle }
+    }
+    Ok(Some((low * high).sqrt()))
 }
 
 fn solve(lattice: &Lattice, mass: Mass, stiffness: f64) -> Result<CuePoint, RunError> {

@@ -49,11 +49,9 @@ impl DegenerateMap {
                     "without a gradient",
                     axis("t (h)", false),
                     axis("distance from the start (µm)", false),
-                    lines(
-                        &["source_maximum", "source_maximum_direction", "zero_gradient", "facing_away"],
-                        &from_middle,
-                    ),
-                    "on a maximum a cone circles; in no gradient it goes straight".into(),
+                    lines(&["source_maximum", "source_maximum_noise", "zero_gradient", "facing_away"], &from_middle),
+                    "leaving a maximum a cone looks straight away from the pull, which turns nothing; noise ends that"
+                        .into(),
                 ),
                 plot(
                     "two shafts in one place",

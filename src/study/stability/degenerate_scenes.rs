@@ -58,6 +58,8 @@ fn gradients() -> Vec<Case> {
     let everywhere = || json!({ "polygon": { "points": [[0, 0], [200, 0], [200, 150], [0, 150]] } });
     let aside = || json!({ "disc": { "centre": [30, 30], "radius": 15 } });
     let wide = "2.5 um^2/s";
+    let mut noisy = sensed(wide, "lumped", "direction", disc());
+    noisy["heading_noise"] = json!({});
     vec![
         case("source_maximum", "born on the source's maximum", sensed(wide, "lumped", "occupancy", disc())),
         case(
@@ -65,6 +67,7 @@ fn gradients() -> Vec<Case> {
             "the same, sensing the direction",
             sensed(wide, "lumped", "direction", disc()),
         ),
+        case("source_maximum_noise", "the same, with heading noise", noisy),
         case("zero_gradient", "the whole tissue releases", sensed(wide, "lumped", "occupancy", everywhere())),
         case(
             "zero_gradient_direction",

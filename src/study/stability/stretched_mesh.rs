@@ -1,7 +1,8 @@
 //! Map: the tissue's mesh after a large stretch.
 //!
-//! A mesh that is Delaunay at rest is stretched homogeneously as the matrix would be with free sides (ν = 0.3): by λ upward and by
-//! √(1 − ν/(1−ν)(λ²−1)) across. Where the angles facing an edge come to more than 180° the lumped matrix loses the sign that keeps
+//! A mesh that is Delaunay at rest is stretched homogeneously as the matrix would be with free sides (ν = 0.3): by λ along and by
+//! √(1 − ν/(1−ν)(λ²−1)) across, upward as in the paper or sideways. The rows of the mesh lie along x: pulled upward its triangles
+//! grow tall and stay acute but for those around sources; pulled sideways they grow flat. Where the angles facing an edge come to more than 180° the lumped matrix loses the sign that keeps
 //! c ≥ 0. Remedy: edges are flipped for the diffusion matrix, vertices stay; edges of source outlines are not flipped.
 
 use super::{Figure, axis, series, unsolved};
@@ -24,7 +25,7 @@ const LAW: ReactionDiffusion = ReactionDiffusion { diffusion: 360.0, degradation
 /// The mesh at one stretch.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct StretchPoint {
-    /// Stretch λ upward.
+    /// Stretch λ.
     pub stretch: f64,
     /// Stretch across.
     pub across: f64,
@@ -49,8 +50,10 @@ pub struct StretchMap {
     pub vertices: usize,
     /// Interior edges of the mesh.
     pub edges: usize,
-    /// One point a stretch.
-    pub points: Vec<StretchPoint>,
+    /// One point a stretch upward.
+    pub upward: Vec<StretchPoint>,
+    /// One point a stretch sideways.
+    pub sideways: Vec<StretchPoint>,
 }
 
 /// Computes the map at `count` stretches, evenly spread from 1 to 1.7.
@@ -62,9 +65,11 @@ pub fn compute(count: usize) -> Result<StretchMap, RunError> {
     let outlines = [Outline::disc([400.0, 500.0], 50.0, SIZE)];
     let fitted = triangulate(&domain, &outlines, &MeshOptions::of_size(SIZE)).map_err(unsolved)?;
     let at = |i: usize| 1.0 + 0.7 * i as f64 / (count.max(2) - 1) as f64;
-    let points: Result<Vec<_>, RunError> = (0..count.max(2)).into_par_iter().map(|i| point(&fitted, at(i))).collect();
+    let along = |axis: usize| -> Result<Vec<StretchPoint>, RunError> {
+        (0..count.max(2)).into_par_iter().map(|i| point(&fitted, at(i), axis)).collect()
+    };
     let edges = Triangles::new(fitted.mesh.cells()).edge_report(fitted.mesh.vertices(), 1.0, 0.0).interior;
-    Ok(StretchMap { vertices: fitted.mesh.vertex_count(), edges, points: points? })
+    Ok(StretchMap { vertices: fitted.mesh.vertex_count(), edges, upward: along(1)?, sideways: along(0)? })
 }
 
 /// Stretch across a stretch λ with free sides.
@@ -72,9 +77,10 @@ fn across(stretch: f64) -> f64 {
     (1.0 - POISSON / (1.0 - POISSON) * (stretch * stretch - 1.0)).sqrt()
 }
 
-fn point(fitted: &FittedMesh, stretch: f64) -> Result<StretchPoint, RunError> {
+fn point(fitted: &FittedMesh, stretch: f64, axis: usize) -> Result<StretchPoint, RunError> {
     let (mesh, across) = (&fitted.mesh, across(stretch));
-    let now: Vec<[f64; 2]> = mesh.vertices().iter().map(|[x, y]| [across * x, stretch * y]).collect();
+    let factor = |k: usize| if k == axis { stretch } else { across };
+    let now: Vec<[f64; 2]> = mesh.vertices().iter().map(|[x, y]| [factor(0) * x, factor(1) * y]).collect();
     let mut triangles = Triangles::new(mesh.cells());
     let share = |triangles: &Triangles| {
         let report = triangles.edge_report(&now, 1.0, 0.0);
@@ -105,8 +111,16 @@ fn point(fitted: &FittedMesh, stretch: f64) -> Result<StretchPoint, RunError> {
 impl StretchMap {
     /// Edges that lose the sign, and the smallest concentration, over the stretch.
     pub fn figure(&self) -> Figure {
-        let over = |name: &str, stroke, of: &dyn Fn(&StretchPoint) -> f64| {
-            series(name, stroke, self.points.iter().map(|point| [point.stretch, of(point)]))
+        let over = |of: &dyn Fn(&StretchPoint) -> [f64; 2]| {
+            let line = |name: &str, stroke, points: &[StretchPoint], which: usize| {
+                series(name, stroke, points.iter().map(|point| [point.stretch, of(point)[which]]))
+            };
+            vec![
+                line("upward, as meshed", Stroke::LineAndMarks, &self.upward, 0),
+                line("upward, after flips", Stroke::Dashed, &self.upward, 1),
+                line("sideways, as meshed", Stroke::LineAndMarks, &self.sideways, 0),
+                line("sideways, after flips", Stroke::Dashed, &self.sideways, 1),
+            ]
         };
         let paper = || vec![Level { name: "20 % a side".into(), at: 1.4, vertical: true }];
         let plot = |title: &str, label: &str, series, note: &str| Plot {
@@ -126,19 +140,13 @@ impl StretchMap {
                 plot(
                     "edges that are not Delaunay",
                     "share of the interior edges (%)",
-                    vec![
-                        over("as meshed", Stroke::LineAndMarks, &|p| 100.0 * p.not_delaunay),
-                        over("after flips", Stroke::Dashed, &|p| 100.0 * p.not_delaunay_after_flips),
-                    ],
+                    over(&|p| [100.0 * p.not_delaunay, 100.0 * p.not_delaunay_after_flips]),
                     "what flips leave lies on source outlines",
                 ),
                 plot(
                     "lumped concentration",
                     "smallest c k/q",
-                    vec![
-                        over("as meshed", Stroke::LineAndMarks, &|p| p.smallest_without_flips),
-                        over("after flips", Stroke::Dashed, &|p| p.smallest),
-                    ],
+                    over(&|p| [p.smallest_without_flips, p.smallest]),
                     "decay length: half the mesh size",
                 ),
             ],

@@ -1,9 +1,10 @@
 //! Map: every integrator of the turning law, eq. (1), from `κΔt` = 0.01 to 100.
 //!
 //! Under a constant unit pull a step of an explicit method takes a small angle β to `R(−κΔt) β`, `R` its stability polynomial:
-//! `|R| ≤ 1` up to 2 (Euler, Heun) and 2.785 (RK4). From a large angle an explicit step also lengthens v_g, from 90° by √(1 + (κΔt)²)
-//! in one step of Euler. A longer v_g turns more slowly, so beyond the limit the angle does not grow for ever: it swings while |v_g|
-//! grows until κΔt v_g/|v_g| is back at the limit. `rotation` takes tan(β/2) to tan(β/2) exp(−κΔt) and keeps |v_g|.
+//! `|R| ≤ 1` up to 2 (Euler, Heun) and 2.785 (RK4). An explicit step also lengthens v_g: one of Euler from the angle β by
+//! √(1 + (κΔt sin β)²). A longer v_g turns more slowly, so beyond the limit the angle does not grow
+//! for ever: |v_g| grows until κΔt over its growth is back at the limit. Beyond κΔt = 1 Euler swings over the pull (R < 0); Heun and RK4
+//! (R > 0) turn away from it instead. `rotation` takes tan(β/2) to tan(β/2) exp(−κΔt) and keeps |v_g|.
 //!
 //! Every figure comes from the integrators that runs use, in a scene of one cone.
 
@@ -23,6 +24,8 @@ use serde_json::json;
 pub const METHODS: [&str; 4] = ["euler", "heun", "rk4", "rotation"];
 /// Steps that each cone takes.
 pub const STEPS: usize = 40;
+/// The angle (degrees) at which swings start.
+pub const START: f64 = 30.0;
 /// The small angle (rad) at which amplification is measured.
 pub const SMALL_ANGLE: f64 = 1e-6;
 
@@ -33,13 +36,13 @@ pub struct TurningPoint {
     pub rate_times_step: f64,
     /// Factor by which one step changes a small angle.
     pub amplification: f64,
-    /// |v_g| over its nominal value after the first step from 90°.
+    /// |v_g| over its nominal value after the first step from [`START`].
     pub first_growth: f64,
-    /// |v_g| over its nominal value after [`STEPS`] steps from 90°.
+    /// |v_g| over its nominal value after [`STEPS`] steps from [`START`].
     pub growth: f64,
-    /// The farthest that a cone swings beyond the pull on its way from 90° (degrees); 0 if it never does.
+    /// The farthest that a cone swings beyond the pull on its way from [`START`] (degrees); 0 if it never does.
     pub overshoot: f64,
-    /// The angle to the pull after [`STEPS`] steps from 90° (degrees, absolute).
+    /// The angle to the pull after [`STEPS`] steps from [`START`] (degrees, absolute).
     pub residual: f64,
     /// Whether the scene's notes warn of the step.
     pub warned: bool,
@@ -82,7 +85,7 @@ pub fn compute(roster: &Roster, count: usize) -> Result<TurningMap, RunError> {
 }
 
 fn point(roster: &Roster, method: &str, rate_times_step: f64) -> Result<TurningPoint, RunError> {
-    let (swing, warned) = swing(roster, method, rate_times_step, 90.0, STEPS)?;
+    let (swing, warned) = swing(roster, method, rate_times_step, START, STEPS)?;
     let beyond = swing.iter().map(|[angle, _]| -angle.to_degrees()).fold(0.0, f64::max);
     let last = swing.last().copied().unwrap_or([f64::NAN; 2]);
     Ok(TurningPoint {
@@ -186,7 +189,7 @@ impl TurningMap {
                 ),
                 plot(
                     "speed",
-                    "|v_g| / v_g after 40 steps from 90°",
+                    "|v_g| / v_g after 40 steps from 30°",
                     true,
                     None,
                     over(&|point| point.growth),
@@ -194,7 +197,7 @@ impl TurningMap {
                 ),
                 plot(
                     "overshoot",
-                    "farthest beyond the pull (degrees)",
+                    "farthest beyond the pull from 30° (degrees)",
                     false,
                     Some([0.0, 180.0]),
                     over(&|point| point.overshoot),

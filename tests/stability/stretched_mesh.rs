@@ -18,14 +18,10 @@ fn a_mesh_that_is_delaunay_at_rest_is_not_after_the_papers_stretch() {
         assert!((paper.stretch - 1.4).abs() < 1e-12 && (paper.across - 0.77).abs() < 0.005, "{paper:?}");
         assert!(paper.not_delaunay > 0.0 && paper.flips > 0, "{paper:?}");
     }
-    // Rows of equilateral cells pulled along: the apex passes 90° where λ/2 = √3/2 √(1 − 3/7 (λ² − 1)), at λ = √(15/8 · 8/8) …
-    let apex = |point: &StretchPoint| 2.0 * (0.5 * point.stretch / (0.75f64.sqrt() * point.across)).atan().to_degrees();
+    // Equilateral cells pulled along their rows: the apex passes 90° where λ/2 = √(3/4) √(1 − 3/7 (λ² − 1)), at λ = √(15/8).
     for point in &MAP.sideways {
-        if apex(point) > 95.0 {
-            assert!(point.not_delaunay > 0.2, "{point:?}");
-        } else if apex(point) < 80.0 {
-            assert!(point.not_delaunay < 0.05, "{point:?}");
-        }
+        let flat = point.stretch > (15.0f64 / 8.0).sqrt();
+        assert!(if flat { point.not_delaunay > 0.3 } else { point.not_delaunay < 0.02 }, "{point:?}");
     }
 }
 
@@ -33,12 +29,12 @@ fn a_mesh_that_is_delaunay_at_rest_is_not_after_the_papers_stretch() {
 fn flips_leave_edges_of_source_outlines_only_and_keep_the_lumped_concentration_positive() {
     for point in all() {
         assert!(point.not_delaunay_after_flips <= 0.01, "{point:?}");
-        assert!(point.smallest >= -1e-9, "{point:?}");
+        assert!(point.smallest >= 0.0, "{point:?}");
     }
 }
 
 #[test]
 fn without_flips_the_lumped_concentration_goes_negative() {
     let worst = all().map(|point| point.smallest_without_flips).fold(f64::INFINITY, f64::min);
-    assert!(worst < -1e-6, "{worst}");
+    assert!(worst < -1e-3, "{worst}");
 }

@@ -75,8 +75,8 @@ pub struct NoiseMap {
     pub methods: Vec<NoiseOfMethod>,
 }
 
-/// Tip (µm from the start) and cosine of the heading of each axon.
-type Tips = Vec<([f64; 2], f64)>;
+/// Tip (µm from the start) and cosine of the heading of an axon.
+type Tip = ([f64; 2], f64);
 
 /// Runs `axons` axons for each integrator and step.
 ///
@@ -112,7 +112,7 @@ pub fn compute(roster: &Roster, axons: usize) -> Result<NoiseMap, RunError> {
     })
 }
 
-fn tips(roster: &Roster, method: &str, step: f64, axons: usize, pull: f64) -> Result<Tips, RunError> {
+fn tips(roster: &Roster, method: &str, step: f64, axons: usize, pull: f64) -> Result<Vec<Tip>, RunError> {
     let scene = json!({
         "seed": 2,
         "tissue": { "outline": { "rectangle": { "width": 1000, "height": 1000 } }, "mesh_size": 250 },
@@ -145,8 +145,8 @@ fn mean(values: impl Iterator<Item = f64>) -> Mean {
     Mean { mean, error: (variance / n).sqrt() }
 }
 
-fn distance(a: &Tips, b: &Tips) -> f64 {
-    let square = |((a, _), (b, _)): (&([f64; 2], f64), &([f64; 2], f64))| (a[0] - b[0]).powi(2) + (a[1] - b[1]).powi(2);
+fn distance(a: &[Tip], b: &[Tip]) -> f64 {
+    let square = |(a, b): (&Tip, &Tip)| (a.0[0] - b.0[0]).powi(2) + (a.0[1] - b.0[1]).powi(2);
     mean(a.iter().zip(b).map(square)).mean.sqrt()
 }
 

@@ -185,7 +185,7 @@ impl TurningMap {
                     true,
                     Some([1e-3, 1e3]),
                     over(&|point| point.amplification),
-                    "above 1 the method swings about the pull",
+                    "above 1 a small angle grows",
                 ),
                 plot(
                     "speed",

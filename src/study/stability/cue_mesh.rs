@@ -150,13 +150,10 @@ fn lattices() -> Result<Vec<Lattice>, RunError> {
 fn sheared(obtuse: bool) -> Result<SimplexMesh<2>, RunError> {
     let square = structured_rectangle(SIDE as f64, SIDE as f64, SIDE, SIDE).map_err(unsolved)?;
     let vertices = square.vertices().iter().map(|[x, y]| [x + 0.5 * y, 0.75f64.sqrt() * y]).collect();
-    let of_square = |pair: &[u32]| match *pair {
-        // The square (a, b, d, c) comes as (a, b, d), (a, d, c): its long diagonal is a–d once sheared.
-        [a, b, d, _, _, c] if !obtuse => [a, b, c, b, d, c],
-        [a, b, d, e, f, c] => [a, b, d, e, f, c],
-        _ => [0; 6],
-    };
-    SimplexMesh::new(vertices, square.cells().chunks(6).flat_map(of_square).collect()).map_err(unsolved)
+    // The square (a, b, d, c) comes as (a, b, d), (a, d, c): a–d is its long diagonal once sheared.
+    let of_square = |&[a, b, d, _, _, c]: &[u32; 6]| if obtuse { [a, b, d, a, d, c] } else { [a, b, c, b, d, c] };
+    let (squares, _) = square.cells().as_chunks::<6>();
+    SimplexMesh::new(vertices, squares.iter().flat_map(of_square).collect()).map_err(unsolved)
 }
 
 /// The cells whose centroid lies within [`RADIUS`] of the middle of the lattice.

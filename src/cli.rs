@@ -12,6 +12,7 @@ use crate::study::laboratory::Laboratory;
 use crate::study::plan::plan;
 use crate::study::run::{RunError, folder_of, simulate, write_figure, write_json, write_results};
 use crate::study::seeds::{over_seeds, summarise};
+use crate::study::stability::Stability;
 use clap::{Args, Parser, Subcommand};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::ffi::OsString;
@@ -68,6 +69,12 @@ enum Command {
         #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1024))]
         threads: Option<u32>,
     },
+    /// Maps where methods fail, and what the program then does: numbers and a figure a map
+    Stability {
+        /// Folder of the results
+        #[arg(long, value_name = "DIR", default_value = "out/stability")]
+        out: PathBuf,
+    },
 }
 
 /// A scenario and what is changed in it.
@@ -110,7 +117,8 @@ const EXAMPLES: &str = "Examples:
   tropism scenarios/olfactory.json --set /seed=7 --set /populations/olfactory/count=50
   tropism scenarios/olfactory.json --seeds 20 --out out/olfactory-20
   tropism plan scenarios/olfactory.json                  what it needs, before it runs
-  tropism chart scenarios/olfactory.json --only cue_field  error against time";
+  tropism chart scenarios/olfactory.json --only cue_field  error against time
+  tropism stability                                      where methods fail, into out/stability";
 
 /// Runs the program with a roster of mechanisms: the whole of `main`, also for programs that add their own.
 pub fn run(arguments: impl IntoIterator<Item = impl Into<OsString> + Clone>, roster: Roster) -> ExitCode {
@@ -153,6 +161,7 @@ fn execute(cli: &Cli, roster: &Roster) -> Result<ExitCode, RunError> {
                 Laboratory { request: &request, roster, repetitions: *repetitions as usize, seeds: *seeds };
             return run_chart(&laboratory, out.as_ref(), only);
         }
+        Some(Command::Stability { out }) => return run_stability(out, roster),
         None => {}
     }
     let loaded = cli.scene.load(roster)?;
@@ -194,6 +203,16 @@ fn run_chart(laboratory: &Laboratory, out: Option<&PathBuf>, only: &[String]) ->
             }
         }
     }
+    println!("results in {}", folder.display());
+    Ok(ExitCode::SUCCESS)
+}
+
+fn run_stability(folder: &std::path::Path, roster: &Roster) -> Result<ExitCode, RunError> {
+    prepare_folder(folder)?;
+    let bar = progress_bar();
+    let maps = Stability::compute(roster, |share| bar.set_position((share * 1000.0) as u64))?;
+    bar.finish_and_clear();
+    maps.write(folder)?;
     println!("results in {}", folder.display());
     Ok(ExitCode::SUCCESS)
 }

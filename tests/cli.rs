@@ -277,6 +277,16 @@ fn results_that_cannot_be_written_end_with_one() {
 }
 
 #[test]
+fn stability_knows_before_it_begins_whether_its_folder_can_be_written() {
+    let folder = Folder::new();
+    folder.write("occupied", "");
+    let output = tropism(&folder, &["stability", "--out", "occupied"]);
+    assert_eq!(code(&output), 1);
+    assert!(errors(&output).contains("occupied"), "{}", errors(&output));
+    assert_eq!(code(&tropism(&folder, &["stability", "--help"])), 0);
+}
+
+#[test]
 fn a_compression_that_has_no_equilibrium_ends_with_one_and_says_load_cell_and_stretch() {
     let mut scene = scene();
     scene["matrix"] = json!({ "motion": { "top": { "outward": -0.2 }, "bottom": { "outward": -0.2 } } });

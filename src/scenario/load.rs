@@ -82,10 +82,31 @@ impl fmt::Display for ScenarioErrors {
 pub fn load(request: &Request, blocks: &[BlockSchema]) -> Result<Loaded, ScenarioErrors> {
     let fail = |problems| ScenarioErrors { path: request.path.clone(), problems };
     let chain = read_chain(&request.path).map_err(|problem| fail(vec![problem]))?;
-    let mut draft = Draft::merge(&chain);
+    check(&chain, request, blocks)
+}
+
+/// As [`load`], for a scene that is a value in memory called `name`. It may have no `base`.
+///
+/// # Errors
+/// As [`load`]; a value that is no object, or that has a base.
+pub fn load_document(name: &str, value: Value, blocks: &[BlockSchema]) -> Result<Loaded, ScenarioErrors> {
+    let request = Request { path: PathBuf::from(name), ..Request::default() };
+    let refusal = match value.as_object() {
+        None => Some(Violation::new("", format!("a scene is a JSON object, not {}", show(&value)))),
+        Some(keys) => keys.get("base").map(|_| Violation::new("/base", "a scene that is no file has no base")),
+    };
+    match refusal {
+        Some(problem) => Err(ScenarioErrors { path: request.path, problems: vec![problem] }),
+        None => check(&[Document { path: request.path.clone(), value }], &request, blocks),
+    }
+}
+
+/// Merges a chain and checks the result.
+fn check(chain: &[Document], request: &Request, blocks: &[BlockSchema]) -> Result<Loaded, ScenarioErrors> {
+    let mut draft = Draft::merge(chain);
     draft.apply_overrides(request, blocks);
     draft.walk(blocks);
-    draft.name_origins(&chain);
+    draft.name_origins(chain);
     let stem = request.path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
     let (scene, blocks) = draft.finish(&stem, blocks);
     match scene {
@@ -93,7 +114,7 @@ pub fn load(request: &Request, blocks: &[BlockSchema]) -> Result<Loaded, Scenari
             let directory = request.path.parent().map(Path::to_path_buf).unwrap_or_default();
             Ok(Loaded { scene, blocks, merged: draft.document, hints: draft.hints, remarks: Vec::new(), directory })
         }
-        _ => Err(fail(draft.problems)),
+        _ => Err(ScenarioErrors { path: request.path.clone(), problems: draft.problems }),
     }
 }
 

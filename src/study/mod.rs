@@ -6,3 +6,4 @@ pub mod laboratory;
 pub mod plan;
 pub mod run;
 pub mod seeds;
+pub mod stability;

@@ -12,10 +12,11 @@ use crate::record::scene_figure::FigureError;
 use crate::record::scene_view::scene_figure;
 use crate::record::snapshot::Snapshot;
 use crate::record::summary::{Summary, SummaryOptions};
-use crate::scenario::load::{Loaded, Request, ScenarioErrors, load};
+use crate::scenario::load::{Loaded, Request, ScenarioErrors, load, load_document};
 use crate::scenario::schema::{BlockFindings, BlockSchema};
 use crate::simulation::{AssemblyError, Simulation};
 use serde::Serialize;
+use serde_json::Value;
 use std::path::{Path, PathBuf};
 
 /// Resolution of pictures, dots an inch.
@@ -57,6 +58,18 @@ pub struct Finished {
 /// # Errors
 /// All problems of the file at once.
 pub fn read(request: &Request, roster: &Roster) -> Result<Loaded, ScenarioErrors> {
+    load(request, &block_schemas(roster))
+}
+
+/// Reads a scenario that is a value in memory called `name`, for a roster.
+///
+/// # Errors
+/// All problems of the value at once.
+pub fn read_document(name: &str, value: Value, roster: &Roster) -> Result<Loaded, ScenarioErrors> {
+    load_document(name, value, &block_schemas(roster))
+}
+
+fn block_schemas(roster: &Roster) -> Vec<BlockSchema> {
     let block = |entry: &Entry| {
         let entry = *entry;
         BlockSchema::new(entry.name, (entry.schema)()).checked_by(move |value, facts| match (entry.read)(value) {
@@ -67,7 +80,7 @@ pub fn read(request: &Request, roster: &Roster) -> Result<Loaded, ScenarioErrors
             Err(message) => BlockFindings { violations: Violation::new("", message).into(), shapes: Vec::new() },
         })
     };
-    load(request, &roster.entries.iter().map(block).collect::<Vec<_>>())
+    roster.entries.iter().map(block).collect()
 }
 
 /// Runs a loaded scene to its end, or to the fault that ends it. `tick` is called after each step with the share done.

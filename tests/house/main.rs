@@ -80,9 +80,9 @@ const ROOMS: &[Room] = &[
     },
     Room {
         folder: "src/study",
-        rooms: &["study", "simulation", "scenario", "record", "model"],
-        packages: &["bevy_ecs", "nalgebra", "serde", "serde_json", "rayon", "thiserror"],
-        rule: "study names simulation, scenario and record; never systems or numerics",
+        rooms: &["study", "simulation", "scenario", "record", "model", "numerics", "prelude", "keys"],
+        packages: &["bevy_ecs", "serde", "serde_json", "nalgebra", "rayon", "thiserror"],
+        rule: "study names simulation, scenario and record; numerics and the prelude too, since maps of stability exercise methods by themselves and under a pull of their own; never systems, which come as a roster",
     },
 ];
 

@@ -1,0 +1,70 @@
+//! The figure of the degenerate scenes.
+
+use super::degenerate::{DegenerateMap, End, Outcome};
+use super::{Figure, axis, series};
+use crate::record::plot::{Axis, Plot, Series, Stroke};
+
+impl DegenerateMap {
+    /// Paths at the border; distances from a maximum or in no gradient; the gap between coincident shafts.
+    pub fn figure(&self) -> Figure {
+        let lines = |names: &[&str], of: &dyn Fn(&Outcome) -> Vec<[f64; 2]>| -> Vec<Series> {
+            let shown = names.iter().filter_map(|name| self.scene(name));
+            shown.map(|outcome| series(words(outcome.name), Stroke::LineAndMarks, of(outcome))).collect()
+        };
+        let plot = |title: &str, x: Axis, y: Axis, series, note: String| Plot {
+            title: title.into(),
+            x,
+            y,
+            series,
+            levels: Vec::new(),
+            marks: Vec::new(),
+            note,
+        };
+        let path = |outcome: &Outcome| {
+            outcome.paths.first().map(|path| path.iter().map(|[_, x, y]| [*x, *y]).collect()).unwrap_or_default()
+        };
+        let from_middle = |outcome: &Outcome| outcome.distances_from([100.0, 75.0]);
+        let count = |end: End| self.scenes.iter().filter(|outcome| outcome.end == end).count();
+        let ends = format!(
+            "of {} scenes {} end, {} by a fault; {} cannot be solved, {} are refused",
+            self.scenes.len(),
+            count(End::Complete) + count(End::Fault),
+            count(End::Fault),
+            count(End::Unsolved),
+            count(End::Refused)
+        );
+        Figure {
+            name: "degenerate",
+            title: "Degenerate scenes",
+            subtitle: "cones of 20 µm/h in a tissue of 200 × 150 µm",
+            plots: vec![
+                plot(
+                    "at the border",
+                    Axis { range: Some([0.0, 210.0]), ..axis("x (µm)", false) },
+                    Axis { range: Some([0.0, 160.0]), ..axis("y (µm)", false) },
+                    lines(&["corner_slide", "corner_leave", "endless_step_slide", "endless_step_stall"], &path),
+                    ends,
+                ),
+                plot(
+                    "without a gradient",
+                    axis("t (h)", false),
+                    axis("distance from the start (µm)", false),
+                    lines(&["source_maximum", "source_maximum_noise", "zero_gradient", "facing_away"], &from_middle),
+                    "leaving a maximum a cone looks straight away from the pull, which turns nothing; noise ends that"
+                        .into(),
+                ),
+                plot(
+                    "two shafts in one place",
+                    axis("t (h)", false),
+                    axis("distance of the second from the first (µm)", false),
+                    lines(&["coincident_together", "coincident_later"], &Outcome::gap),
+                    "attraction vanishes at contact".into(),
+                ),
+            ],
+        }
+    }
+}
+
+fn words(name: &str) -> String {
+    name.replace('_', " ")
+}

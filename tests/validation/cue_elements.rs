@@ -11,7 +11,8 @@ use tropism::systems::standard;
 use crate::common::{assembled, to_end, try_load};
 
 fn scene(mesh_size: f64, cue: Value, moves: bool) -> Value {
-    let mut block = json!({ "diffusion": "2.5 um^2/s", "sources": [{ "disc": { "centre": [100, 120], "radius": 15 } }] });
+    let mut block =
+        json!({ "diffusion": "2.5 um^2/s", "sources": [{ "disc": { "centre": [100, 120], "radius": 15 } }] });
     block.as_object_mut().unwrap().extend(cue.as_object().unwrap().clone());
     let matrix = json!({ "motion": { "top": { "outward": 0.1 }, "bottom": { "outward": 0.1 } } });
     json!({

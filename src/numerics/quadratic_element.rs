@@ -100,10 +100,8 @@ impl Forms {
     /// Those of a cell.
     pub(crate) fn of<const D: usize>(element: &Element<D>) -> Self {
         let volume = element.volume;
-        let mut gram = [[0.0; 4]; 4];
-        for a in 0..=D {
-            (0..=D).for_each(|b| gram[a][b] = volume * dot(&element.gradients[a], &element.gradients[b]));
-        }
+        let g = &element.gradients;
+        let gram = std::array::from_fn(|a| std::array::from_fn(|b| volume * dot(&g[a], &g[b])));
         Self { gram, volume }
     }
 
@@ -111,13 +109,11 @@ impl Forms {
     /// `dG_ab/ds = V [div w (g_a·g_b) − g_a·(∇w + ∇wᵀ) g_b]`, `dV/ds = V div w`.
     pub(crate) fn rate<const D: usize>(element: &Element<D>, w: &[[f64; D]; D]) -> Self {
         let (volume, divergence) = (element.volume, divergence(w));
-        let mut gram = [[0.0; 4]; 4];
-        for b in 0..=D {
-            let g = &element.gradients[b];
-            let moved: [f64; D] =
-                std::array::from_fn(|k| divergence * g[k] - (0..D).map(|l| (w[k][l] + w[l][k]) * g[l]).sum::<f64>());
-            (0..=D).for_each(|a| gram[a][b] = volume * dot(&element.gradients[a], &moved));
-        }
+        let moved = element.gradients.map(|g| -> [f64; D] {
+            std::array::from_fn(|k| divergence * g[k] - (0..D).map(|l| (w[k][l] + w[l][k]) * g[l]).sum::<f64>())
+        });
+        let g = &element.gradients;
+        let gram = std::array::from_fn(|a| std::array::from_fn(|b| volume * dot(&g[a], &moved[b])));
         Self { gram, volume: volume * divergence }
     }
 

@@ -5,5 +5,6 @@ mod elasticity;
 mod equilibria;
 mod gradient_recovery;
 mod load_path;
+mod quadratic_field;
 mod reaction_diffusion;
 mod turning;

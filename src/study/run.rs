@@ -12,6 +12,7 @@ use crate::record::scene_figure::FigureError;
 use crate::record::scene_view::scene_figure;
 use crate::record::snapshot::Snapshot;
 use crate::record::summary::{Summary, SummaryOptions};
+use crate::record::svg::Svg;
 use crate::scenario::load::{Loaded, Request, ScenarioErrors, load, load_document};
 use crate::scenario::schema::{BlockFindings, BlockSchema};
 use crate::simulation::{AssemblyError, Simulation};
@@ -20,7 +21,7 @@ use serde_json::Value;
 use std::path::{Path, PathBuf};
 
 /// Resolution of pictures, dots an inch.
-pub const DPI: f32 = 200.0;
+const DPI: f32 = 200.0;
 
 /// Why there are no results, or not all of them.
 #[derive(Debug, thiserror::Error)]
@@ -177,8 +178,16 @@ pub fn write_figure(folder: &Path, loaded: &Loaded, snapshots: &[Snapshot]) -> R
         return Ok(());
     }
     let figure = scene_figure(&loaded.scene.name, &loaded.scene.description, snapshots)?;
-    write_atomically(&folder.join("figure.svg"), figure.finish().as_bytes())?;
-    write_atomically(&folder.join("figure.png"), &to_png(&figure.outlined(), scale_for_dpi(DPI))?)?;
+    write_picture(folder, "figure", &figure)
+}
+
+/// Writes a drawing as `<name>.svg` and `<name>.png`.
+///
+/// # Errors
+/// As [`write_results`].
+pub fn write_picture(folder: &Path, name: &str, drawing: &Svg) -> Result<(), RunError> {
+    write_atomically(&folder.join(format!("{name}.svg")), drawing.finish().as_bytes())?;
+    write_atomically(&folder.join(format!("{name}.png")), &to_png(&drawing.outlined(), scale_for_dpi(DPI))?)?;
     Ok(())
 }
 

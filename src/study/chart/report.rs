@@ -4,8 +4,7 @@ use super::Chart;
 use super::work_precision::{ErrorKind, Factor, Slope};
 use crate::record::output::write_atomically;
 use crate::record::plot::{Axis, Level, Mark, Plot, Series, Stroke, draw};
-use crate::record::png::{scale_for_dpi, to_png};
-use crate::study::run::{DPI, RunError, write_json};
+use crate::study::run::{RunError, write_json, write_picture};
 use serde::Serialize;
 use std::fmt::Write;
 use std::path::Path;
@@ -47,9 +46,7 @@ pub fn write(folder: &Path, chart: &Chart) -> Result<(), RunError> {
     for factor in &chart.factors {
         let title = format!("{}: {}", chart.scene, factor.title);
         let drawing = draw(&title, &format!("{} {}", factor.advice, factor.remark), &plots(factor))?;
-        let stem = folder.join(format!("chart_{}", factor.name));
-        write_atomically(&stem.with_extension("svg"), drawing.finish().as_bytes())?;
-        write_atomically(&stem.with_extension("png"), &to_png(&drawing.outlined(), scale_for_dpi(DPI))?)?;
+        write_picture(folder, &format!("chart_{}", factor.name), &drawing)?;
     }
     Ok(())
 }

@@ -20,11 +20,9 @@ pub mod noise;
 pub mod stretched_mesh;
 pub mod turning;
 
-use super::run::{DPI, RunError, write_json};
+use super::run::{RunError, write_json, write_picture};
 use crate::model::mechanism::Roster;
-use crate::record::output::write_atomically;
 use crate::record::plot::{Axis, Plot, Series, Stroke, draw};
-use crate::record::png::{scale_for_dpi, to_png};
 use serde::Serialize;
 use std::path::Path;
 
@@ -105,9 +103,7 @@ impl Stability {
     pub fn write(&self, folder: &Path) -> Result<(), RunError> {
         write_json(&folder.join("stability.json"), self)?;
         for Figure { name, title, subtitle, plots } in self.figures() {
-            let drawing = draw(title, subtitle, &plots)?;
-            write_atomically(&folder.join(format!("{name}.svg")), drawing.finish().as_bytes())?;
-            write_atomically(&folder.join(format!("{name}.png")), &to_png(&drawing.outlined(), scale_for_dpi(DPI))?)?;
+            write_picture(folder, name, &draw(title, subtitle, &plots)?)?;
         }
         Ok(())
     }

@@ -22,6 +22,7 @@ pub mod measures;
 pub mod output;
 pub mod plot;
 pub mod plot_axis;
+mod plot_parts;
 pub mod png;
 pub mod polyline;
 pub mod raster;

@@ -3,9 +3,9 @@
 //! Series differ by colour (Okabe & Ito) *and* by the shape of their marks, so that they are told apart in print and by the
 //! colour-blind. The label of the y axis stands above it, level with the eye that reads it.
 
-use super::colour::hexadecimal;
 pub use super::plot_axis::Axis;
 use super::plot_axis::Scale;
+use super::plot_parts::{Frame, Words, colour_of, draw_line, draw_mark, draw_polylines};
 use super::scene_figure::FigureError;
 use super::svg::{Anchor, Label, Svg, number, path_data};
 use super::theme::{self, Font};
@@ -90,22 +90,8 @@ const FRAME_HEIGHT: f64 = 230.0;
 const LEFT_ROOM: f64 = 44.0;
 /// Room under a frame for ticks and the label.
 const FOOT_ROOM: f64 = 36.0;
-/// Size of marks.
-const MARK: f64 = 3.2;
 const SMALL: Font = Font::regular(theme::SMALL);
 const GRID: &str = "#e6e3de";
-const UNDERLAY: &str = "#f3d9a4";
-/// Okabe & Ito's colours, black first.
-const COLOURS: [[u8; 3]; 8] = [
-    [0x1a, 0x1a, 0x1a],
-    [0x00, 0x72, 0xb2],
-    [0xd5, 0x5e, 0x00],
-    [0x00, 0x9e, 0x73],
-    [0xcc, 0x79, 0xa7],
-    [0xe6, 0x9f, 0x00],
-    [0x56, 0xb4, 0xe9],
-    [0x7a, 0x5c, 0x3a],
-];
 
 /// Plots side by side under a title, two a row. Points that are not finite, or have no logarithm on such an axis, are left out.
 ///
@@ -208,8 +194,9 @@ impl<'a> Placed<'a> {
                 self.draw_series(svg, &frame, index, series);
             }
         }
-        self.draw_levels(svg, &frame);
-        self.draw_marks(svg, &frame);
+        let mut words = Words::default();
+        self.draw_levels(svg, &frame, &mut words);
+        self.draw_marks(svg, &frame, &mut words);
         let mut at = [corner[0], frame.corner[1] + FRAME_HEIGHT + FOOT_ROOM + 4.0];
         at[1] = self.draw_legend(svg, at);
         write_lines(svg, &self.note, [at[0], at[1] + 3.0], SMALL, theme::MUTED);
@@ -249,7 +236,7 @@ impl<'a> Placed<'a> {
     }
 
     fn draw_series(&self, svg: &mut Svg, frame: &Frame, index: usize, series: &Series) {
-        let colour = hexadecimal(COLOURS[index % COLOURS.len()]);
+        let colour = colour_of(index);
         let places: Vec<Option<[f64; 2]>> = series.points.iter().map(|point| self.place(frame, *point)).collect();
         if series.stroke != Stroke::Marks {
             // A point that cannot be shown breaks the line.
@@ -268,7 +255,7 @@ impl<'a> Placed<'a> {
         }
     }
 
-    fn draw_levels(&self, svg: &mut Svg, frame: &Frame) {
+    fn draw_levels(&self, svg: &mut Svg, frame: &Frame, words: &mut Words) {
         for level in &self.plot.levels {
             let scale = if level.vertical { &self.x } else { &self.y };
             let Some(share) = scale.share(level.at) else { continue };
@@ -281,11 +268,11 @@ impl<'a> Placed<'a> {
                 (true, false) => ([to[0] + 3.0, to[1] + theme::SMALL], Anchor::Start),
                 (false, _) => ([to[0] - 2.0, to[1] - 3.0], Anchor::End),
             };
-            svg.label(&Label { at, anchor, font: SMALL, colour: theme::MUTED, halo: true, text: &level.name });
+            words.write(svg, Label { at, anchor, font: SMALL, colour: theme::MUTED, halo: true, text: &level.name });
         }
     }
 
-    fn draw_marks(&self, svg: &mut Svg, frame: &Frame) {
+    fn draw_marks(&self, svg: &mut Svg, frame: &Frame, words: &mut Words) {
         for mark in &self.plot.marks {
             let Some(at) = self.place(frame, mark.at) else { continue };
             let [x, y] = at.map(number);
@@ -295,7 +282,7 @@ impl<'a> Placed<'a> {
             let (dx, anchor) = if right { (-9.0, Anchor::End) } else { (9.0, Anchor::Start) };
             let at = [at[0] + dx, at[1] - 5.0];
             let font = Font::bold(theme::SMALL);
-            svg.label(&Label { at, anchor, font, colour: theme::TEXT, halo: true, text: &mark.name });
+            words.write(svg, Label { at, anchor, font, colour: theme::TEXT, halo: true, text: &mark.name });
         }
     }
 
@@ -306,7 +293,7 @@ impl<'a> Placed<'a> {
             for &index in row {
                 let series = &self.plot.series[index];
                 let middle = top + 0.62 * theme::SMALL;
-                let colour = hexadecimal(COLOURS[index % COLOURS.len()]);
+                let colour = colour_of(index);
                 if series.stroke != Stroke::Marks {
                     draw_polylines(svg, &[vec![[x, middle], [x + 20.0, middle]]], &colour, series.stroke);
                 }
@@ -319,19 +306,6 @@ impl<'a> Placed<'a> {
             top += SMALL.line();
         }
         top
-    }
-}
-
-/// The rectangle of the axes, in px.
-struct Frame {
-    corner: [f64; 2],
-    size: [f64; 2],
-}
-
-impl Frame {
-    /// A place by its shares of the axes, y upward.
-    fn at(&self, [x, y]: [f64; 2]) -> [f64; 2] {
-        [self.corner[0] + x * self.size[0], self.corner[1] + (1.0 - y) * self.size[1]]
     }
 }
 
@@ -355,43 +329,6 @@ fn legend_rows(series: &[Series], width: f64) -> Vec<Vec<usize>> {
         used += own;
     }
     rows
-}
-
-fn draw_line(svg: &mut Svg, [from, to]: [[f64; 2]; 2], style: &[(&str, &str)]) {
-    let data = path_data([&[from, to][..]]);
-    svg.element("path", &[&[("d", data.as_str()), ("fill", "none")], style].concat());
-}
-
-fn draw_polylines(svg: &mut Svg, pieces: &[Vec<[f64; 2]>], colour: &str, stroke: Stroke) {
-    let data = path_data(pieces.iter().map(Vec::as_slice));
-    if data.is_empty() {
-        return;
-    }
-    let (colour, width) = if stroke == Stroke::Underlay { (UNDERLAY, "7") } else { (colour, "1.5") };
-    let mut style = vec![("d", data.as_str()), ("fill", "none"), ("stroke", colour), ("stroke-width", width)];
-    if stroke == Stroke::Dashed {
-        style.push(("stroke-dasharray", "5 3"));
-    }
-    svg.element("path", &style);
-}
-
-/// One mark: disc, square, diamond or triangle, filled for the first four series and hollow for the next.
-fn draw_mark(svg: &mut Svg, index: usize, [x, y]: [f64; 2]) {
-    let colour = hexadecimal(COLOURS[index % COLOURS.len()]);
-    let fill = if index / 4 % 2 == 0 { colour.as_str() } else { "#ffffff" };
-    let style = [("fill", fill), ("stroke", colour.as_str()), ("stroke-width", "1.2")];
-    if index % 4 == 0 {
-        let [x, y, r] = [x, y, MARK].map(number);
-        return svg.element("circle", &[&[("cx", x.as_str()), ("cy", &y), ("r", &r)], &style[..]].concat());
-    }
-    let corners: &[[f64; 2]] = match index % 4 {
-        1 => &[[-0.9, -0.9], [0.9, -0.9], [0.9, 0.9], [-0.9, 0.9]],
-        2 => &[[0.0, -1.3], [1.3, 0.0], [0.0, 1.3], [-1.3, 0.0]],
-        _ => &[[0.0, -1.3], [1.2, 0.8], [-1.2, 0.8]],
-    };
-    let points: Vec<[f64; 2]> = corners.iter().map(|c| [x + MARK * c[0], y + MARK * c[1]]).collect();
-    let data = format!("{}z", path_data([points.as_slice()]));
-    svg.element("path", &[&[("d", data.as_str())], &style[..]].concat());
 }
 
 #[cfg(test)]

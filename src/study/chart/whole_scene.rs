@@ -1,7 +1,7 @@
 //! The whole scene's chart: what a coarser step or mesh changes in the measures that a biologist reads, beside what another
 //! seed changes.
 
-use super::work_precision::{ErrorKind, Factor, Seconds, short};
+use super::work_precision::{ErrorKind, Factor, Point, Seconds, short, time};
 use crate::record::summary::Summary;
 use crate::scenario::load::Loaded;
 use crate::study::laboratory::{Laboratory, Setting};
@@ -9,10 +9,10 @@ use crate::study::run::{RunError, simulate};
 use std::collections::BTreeMap;
 use std::time::Instant;
 
-const STEPS: [f64; 4] = [2.0, 1.0, 0.5, 0.25];
-const MESHES: [f64; 3] = [2.0, 1.0, 0.5];
-/// Step and mesh of the reference.
-const REFERENCE: f64 = 0.25;
+/// Steps over the scene's own, the finest first: it is the reference.
+const STEPS: [f64; 4] = [0.25, 0.5, 1.0, 2.0];
+/// Mesh sizes over the scene's own, beside that itself.
+const MESHES: [f64; 2] = [0.5, 2.0];
 const KINDS: [(&str, &str); 3] = [
     ("hits", "change of the hit fraction"),
     ("spread", "change of the spread at the highest height (um)"),
@@ -28,15 +28,16 @@ type Measures = [Option<f64>; 3];
 /// A scene that cannot be assembled.
 pub fn chart(laboratory: &Laboratory, tick: &dyn Fn(f64)) -> Result<Factor, RunError> {
     let scene = laboratory.scene()?;
+    let variants = STEPS.map(|step| (step, 1.0)).into_iter().chain(MESHES.map(|mesh| (1.0, mesh)));
     let jobs = (STEPS.len() + MESHES.len()) as f64;
-    let (reference, _) = runs(laboratory, &setting(&scene, REFERENCE, 1.0))?;
-    let mut points = Vec::new();
-    for (done, (step, mesh)) in
-        STEPS.map(|step| (step, 1.0)).into_iter().chain(MESHES.map(|mesh| (1.0, mesh))).enumerate()
-    {
-        tick((1.0 + done as f64) / (1.0 + jobs));
+    let (mut points, mut reference): (Vec<Point>, Vec<Measures>) = (Vec::new(), Vec::new());
+    for (done, (step, mesh)) in variants.enumerate() {
+        tick(done as f64 / jobs);
         let setting = setting(&scene, step, mesh);
         let (found, seconds) = runs(laboratory, &setting)?;
+        if reference.is_empty() {
+            reference.clone_from(&found);
+        }
         points.push(setting.point(seconds, changes(&found, &reference), BTreeMap::new()));
     }
     let kind = |(k, (name, label)): (usize, &(&str, &str))| {
@@ -118,16 +119,15 @@ fn standard_deviation(values: &[f64]) -> f64 {
 }
 
 /// The fastest setting whose changes all lie below what the seeds leave undecided.
-fn advice(points: &[super::work_precision::Point], errors: &[ErrorKind]) -> String {
-    let below = |point: &&super::work_precision::Point| {
-        errors.iter().all(|error| point.errors[&error.name] <= error.levels["95 % of the mean"])
-    };
-    let fastest = points.iter().filter(below).min_by(|a, b| a.seconds.median.total_cmp(&b.seconds.median));
+fn advice(points: &[Point], errors: &[ErrorKind]) -> String {
+    let below =
+        |point: &&Point| errors.iter().all(|error| point.errors[&error.name] <= error.levels["95 % of the mean"]);
+    let fastest = points.iter().skip(1).filter(below).min_by(|a, b| a.seconds.median.total_cmp(&b.seconds.median));
     match fastest {
         Some(point) => format!(
             "The fastest setting whose measures do not differ from the reference's beyond the seeds' own 95 % is {} ({} a run).",
             point.setting,
-            super::work_precision::time(point.seconds.median)
+            time(point.seconds.median)
         ),
         None => "Every setting changes some measure beyond the seeds' own 95 %: take a shorter step.".to_owned(),
     }

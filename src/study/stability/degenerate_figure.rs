@@ -7,9 +7,9 @@ use crate::record::plot::{Axis, Plot, Series, Stroke};
 impl DegenerateMap {
     /// Paths at the border; distances from a maximum or in no gradient; the gap between coincident shafts.
     pub fn figure(&self) -> Figure {
-        let lines = |names: &[&str], of: &dyn Fn(&Outcome) -> Vec<[f64; 2]>| -> Vec<Series> {
+        let lines = |names: &[&str], stroke: Stroke, of: &dyn Fn(&Outcome) -> Vec<[f64; 2]>| -> Vec<Series> {
             let shown = names.iter().filter_map(|name| self.scene(name));
-            shown.map(|outcome| series(words(outcome.name), Stroke::LineAndMarks, of(outcome))).collect()
+            shown.map(|outcome| series(words(outcome.name), stroke, of(outcome))).collect()
         };
         let plot = |title: &str, x: Axis, y: Axis, series, note: String| Plot {
             title: title.into(),
@@ -40,25 +40,33 @@ impl DegenerateMap {
             plots: vec![
                 plot(
                     "at the border",
-                    Axis { range: Some([0.0, 210.0]), ..axis("x (µm)", false) },
-                    Axis { range: Some([0.0, 160.0]), ..axis("y (µm)", false) },
-                    lines(&["corner_slide", "corner_leave", "endless_step_slide", "endless_step_stall"], &path),
+                    Axis { range: Some([175.0, 205.0]), ..axis("x (µm)", false) },
+                    Axis { range: Some([125.0, 155.0]), ..axis("y (µm)", false) },
+                    lines(
+                        &["corner_slide", "corner_leave", "endless_step_slide", "endless_step_stall"],
+                        Stroke::LineAndMarks,
+                        &path,
+                    ),
                     ends,
                 ),
                 plot(
                     "without a gradient",
                     axis("t (h)", false),
                     axis("distance from the start (µm)", false),
-                    lines(&["source_maximum", "source_maximum_noise", "zero_gradient", "facing_away"], &from_middle),
+                    lines(
+                        &["source_maximum", "source_maximum_noise", "zero_gradient", "facing_away"],
+                        Stroke::Line,
+                        &from_middle,
+                    ),
                     "leaving a maximum a cone looks straight away from the pull, which turns nothing; noise ends that"
                         .into(),
                 ),
                 plot(
                     "two shafts in one place",
                     axis("t (h)", false),
-                    axis("distance of the second from the first (µm)", false),
-                    lines(&["coincident_together", "coincident_later"], &Outcome::gap),
-                    "attraction vanishes at contact".into(),
+                    Axis { range: Some([0.0, 1.0]), ..axis("distance of the second from the first (µm)", false) },
+                    lines(&["coincident_together", "coincident_later"], Stroke::Line, &Outcome::gap),
+                    "attraction vanishes at contact: round-off does not part them".into(),
                 ),
             ],
         }

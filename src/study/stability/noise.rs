@@ -205,14 +205,14 @@ impl NoiseMap {
                     cosine("mean cos Δθ"),
                     statistic(&|p| p.free_cosine),
                     label(self.free_cosine),
-                    "exp(−v t/ℓ)",
+                    "closed form: exp(−v t / persistence length)",
                 ),
                 plot(
                     "under a pull",
                     cosine("mean cos β"),
                     statistic(&|p| p.pulled_cosine),
                     label(self.pulled_cosine),
-                    "von Mises: I₁/I₀ of κℓ/v",
+                    "closed form: von Mises, I₁/I₀ of κ/v times the persistence length",
                 ),
             ],
         }

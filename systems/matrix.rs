@@ -5,6 +5,7 @@
 //! polynomials; v_φ = ṡ times the derivative of that interpolant. The paper moves top and bottom by "about 20 % of the initial
 //! vertical dimension for each side"; ours: outward, held sideways, linear in time, material numbers.
 
+use crate::numerics::ellipticity::ellipticity_left;
 use crate::numerics::hermite::Interpolation as Course;
 use crate::numerics::hyperelasticity::{Body, Prescribed};
 use crate::numerics::load_path::{LoadPath, LoadPathOptions};
@@ -82,6 +83,13 @@ keys! {
         pub tolerance: Factor = Factor(1e-6),
         /// What the displacement does between load levels. Ours.
         pub interpolation: Interpolation = Interpolation::Cubic,
+    }
+}
+
+impl LoadCurve {
+    /// The largest load that is reached.
+    fn largest(&self) -> f64 {
+        if self.times.is_empty() { 1.0 } else { self.loads.iter().map(|load| load.0).fold(0.0, f64::max) }
     }
 }
 
@@ -177,6 +185,9 @@ impl Mechanism for Matrix {
         let path = LoadPath::solve(&body, &options).map_err(|error| {
             InstallError::Solve(format!("the matrix (eq. 3) has no path to its full load: {error}{}", remedy(&self)))
         })?;
+        let mut farthest = vec![0.0; body.unknowns()];
+        path.displacement(self.load.largest(), &mut farthest);
+        let used = 1.0 - ellipticity_left(&body, &farthest);
         let duration = model.world.resource::<Clock>().grid.hours(model.world.resource::<Clock>().end);
         record(model.world, &path);
         tell_kinks(model.world, &self.load);
@@ -189,6 +200,12 @@ impl Mechanism for Matrix {
             report.solves
         );
         model.plan().keep("matrix", why);
+        model.plan().compare(
+            "matrix: ellipticity used up at the largest load",
+            used,
+            1.0,
+            "less motion, sliding edges or `neo_hookean`",
+        );
         model.insert(Loading { path, curve: self.load.clone(), duration }).insert_law(self);
         model.motion(follow_load);
         Ok(())

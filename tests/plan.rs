@@ -35,6 +35,23 @@ fn planned(scene: &Value) -> ScenePlan {
     plan(&loaded(scene, &roster), &roster, Path::new("scene.json")).unwrap()
 }
 
+fn margin(plan: &ScenePlan, name: &str) -> Option<f64> {
+    plan.plan.margins.iter().find(|margin| margin.name.contains(name)).map(|margin| margin.value)
+}
+
+#[test]
+fn the_plan_says_how_much_of_ellipticity_a_compression_uses_up() {
+    let squeezed = |outward: f64| {
+        let slides = json!({ "outward": outward, "sideways": "sliding" });
+        let found = planned(&changed(|scene| scene["matrix"] = json!({ "motion": { "top": slides } })));
+        margin(&found, "ellipticity").unwrap()
+    };
+    let (stretched, slightly, strongly) = (squeezed(0.2), squeezed(-0.05), squeezed(-0.2));
+    assert!(stretched < 0.2, "{stretched}");
+    assert!(slightly > 0.02 && strongly > 2.0 * slightly && strongly < 1.0, "{slightly} {strongly}");
+    assert_eq!(margin(&planned(&changed(|scene| scene["matrix"] = Value::Null)), "ellipticity"), None);
+}
+
 /// Whether a part is kept; none if the plan does not speak of it.
 fn kept(plan: &ScenePlan, name: &str) -> Option<bool> {
     plan.plan.parts.iter().find(|part| part.name == name).map(|part| part.kept)

@@ -5,6 +5,7 @@ pub mod contact_integral;
 mod cue_element;
 pub mod delaunay;
 pub mod element_gradient;
+pub mod ellipticity;
 pub mod field_layout;
 pub mod field_path;
 pub mod hermite;

@@ -10,9 +10,9 @@ use crate::study::run::RunError;
 use nalgebra::Vector3;
 use std::collections::BTreeMap;
 
-const SIZES: [f64; 7] = [2.0, 1.414, 1.0, 0.707, 0.5, 0.354, 0.25];
-const REFERENCE_SIZE: f64 = 0.125;
-const SECOND_SIZE: f64 = 0.177;
+const SIZES: [f64; 7] = [2.828, 2.0, 1.414, 1.0, 0.707, 0.5, 0.354];
+const REFERENCE_SIZE: f64 = 0.177;
+const SECOND_SIZE: f64 = 0.25;
 const TOLERANCES: [f64; 6] = [1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7];
 const REFERENCE_TOLERANCE: f64 = 1e-11;
 const COURSES: [&str; 2] = ["cubic", "linear"];

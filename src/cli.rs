@@ -197,6 +197,9 @@ fn run_chart(laboratory: &Laboratory, out: Option<&PathBuf>, only: &[String]) ->
     chart::report::write(&folder, &chart)?;
     for factor in &chart.factors {
         println!("{}\n  {}", factor.title, factor.advice);
+        for power in factor.growth().iter().filter(|_| factor.errors.is_empty()) {
+            println!("  time grows with the power {:.2} ({}, {} points)", power.order, power.method, power.points);
+        }
         for error in &factor.errors {
             for slope in factor.slopes(error) {
                 println!("  {}: order {:.2} ({}, {} points)", error.name, slope.order, slope.method, slope.points);

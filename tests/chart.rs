@@ -99,6 +99,7 @@ fn cones_show_the_orders_of_their_methods_and_neighbour_searches_agree() {
     assert!(rotation > 1.5, "{rotation}");
     assert!(points(&found.factors[0], "bogacki_shampine").len() >= 5);
     assert_eq!(found.factors[3].points.len(), 8);
+    assert_eq!(found.factors[3].growth().len(), 2);
 }
 
 #[test]

@@ -25,6 +25,11 @@ impl Stopwatch {
         self.last = now;
     }
 
+    /// Seconds booked on all phases together.
+    pub fn total(&self) -> f64 {
+        self.seconds.values().sum()
+    }
+
     /// Seconds booked on each phase.
     pub fn seconds(&self) -> &BTreeMap<&'static str, f64> {
         &self.seconds

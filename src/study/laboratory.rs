@@ -10,7 +10,6 @@ use crate::simulation::Simulation;
 use bevy_ecs::prelude::With;
 use nalgebra::Vector3;
 use std::collections::BTreeMap;
-use std::time::Instant;
 
 /// A scene to experiment with.
 pub struct Laboratory<'a> {
@@ -117,12 +116,13 @@ impl<'a> Laboratory<'a> {
     pub fn timed_run(&self, loaded: &Loaded, stop: f64, phases: &[&str]) -> Result<(Simulation, Seconds), RunError> {
         self.repeated(|| {
             let mut simulation = self.assemble(loaded)?;
-            let start = Instant::now();
+            let before = simulation.world().resource::<Stopwatch>().total();
             run_until(&mut simulation, stop)?;
-            let whole = start.elapsed().as_secs_f64();
-            let booked = simulation.world().resource::<Stopwatch>().seconds();
-            let some = phases.iter().filter_map(|phase| booked.get(phase)).sum();
-            Ok((simulation, if phases.is_empty() { whole } else { some }))
+            simulation.lap("record");
+            let stopwatch = simulation.world().resource::<Stopwatch>();
+            let some = phases.iter().filter_map(|phase| stopwatch.seconds().get(phase)).sum();
+            let seconds = if phases.is_empty() { stopwatch.total() - before } else { some };
+            Ok((simulation, seconds))
         })
     }
 

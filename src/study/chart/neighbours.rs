@@ -1,6 +1,6 @@
 //! The neighbours' chart: an R-tree with lists against a look at every segment of every shaft.
 
-use super::work_precision::{ErrorKind, Factor, short};
+use super::work_precision::{Factor, Point, short, time};
 use crate::study::laboratory::{Laboratory, Setting, cones};
 use crate::study::run::RunError;
 use std::collections::BTreeMap;
@@ -45,7 +45,7 @@ pub fn chart(laboratory: &Laboratory, tick: &dyn Fn(f64)) -> Result<Option<Facto
             let counters = simulation.counters();
             let counts = [("segments", counters.indexed_segments), ("queries", counters.neighbour_queries)];
             let counts = counts.map(|(name, count)| (name.to_owned(), count as f64)).into();
-            points.push(setting.point(seconds, [("axons".to_owned(), axons as f64)].into(), counts));
+            points.push(setting.point(seconds, BTreeMap::new(), counts));
             seen.push(cones(&simulation));
         }
         if seen.windows(2).any(|pair| pair[0] != pair[1]) {
@@ -58,21 +58,21 @@ pub fn chart(laboratory: &Laboratory, tick: &dyn Fn(f64)) -> Result<Option<Facto
         name: "neighbours".into(),
         title: "Neighbours: R-tree with lists against every segment".into(),
         knob: "axons".into(),
-        errors: vec![ErrorKind { name: "axons".into(), label: "axons".into(), floor: 0.0, levels: BTreeMap::new() }],
+        errors: Vec::new(),
         advice: compare(&points),
         points,
         remark,
     }))
 }
 
-fn compare(points: &[super::work_precision::Point]) -> String {
+fn compare(points: &[Point]) -> String {
     let last = |method: &str| points.iter().rev().find(|point| point.method == method);
     match (last(METHODS[0].0), last(METHODS[1].0)) {
         (Some(tree), Some(all)) => format!(
             "At {} the tree takes {}, every segment {}: {} times as long.",
             tree.setting,
-            super::work_precision::time(tree.seconds.median),
-            super::work_precision::time(all.seconds.median),
+            time(tree.seconds.median),
+            time(all.seconds.median),
             short(all.seconds.median / tree.seconds.median)
         ),
         _ => String::new(),

@@ -1,7 +1,7 @@
 //! A chart as files: one table, one JSON document, one figure a factor.
 
 use super::Chart;
-use super::work_precision::{ErrorKind, Factor, Slope};
+use super::work_precision::{ErrorKind, Factor, Point, Slope};
 use crate::record::output::write_atomically;
 use crate::record::plot::{Axis, Level, Mark, Plot, Series, Stroke, draw};
 use crate::study::run::{RunError, write_json, write_picture};
@@ -16,6 +16,7 @@ struct Reported<'a> {
     factor: &'a Factor,
     slopes: Vec<(&'a str, Vec<Slope>)>,
     front: Vec<(&'a str, Vec<String>)>,
+    growth: Vec<Slope>,
 }
 
 /// Writes `chart.json`, `chart.csv` and `chart_<factor>.svg/.png`.
@@ -27,6 +28,7 @@ pub fn write(folder: &Path, chart: &Chart) -> Result<(), RunError> {
         factor,
         slopes: factor.errors.iter().map(|error| (error.name.as_str(), factor.slopes(error))).collect(),
         front: factor.errors.iter().map(|error| (error.name.as_str(), front_words(factor, error))).collect(),
+        growth: if factor.errors.is_empty() { factor.growth() } else { Vec::new() },
     };
     #[derive(Serialize)]
     struct Document<'a> {
@@ -55,47 +57,59 @@ fn front_words(factor: &Factor, error: &ErrorKind) -> Vec<String> {
     factor.front(error).iter().map(|point| format!("{}, {}", point.method, point.setting)).collect()
 }
 
-/// One row a setting and an error.
+/// One row a setting and an error; a row without error where methods agree exactly.
 fn table(chart: &Chart) -> String {
     let mut text =
         "factor,method,setting,knob,error_kind,error,floor,seconds_median,seconds_low,seconds_high,on_front,default\n"
             .to_owned();
     for factor in &chart.factors {
+        let mut row = |point: &Point, error: String, on_front: bool| {
+            let Point { method, setting, knob, seconds, default, .. } = point;
+            // Writing to a string cannot fail.
+            let _ = writeln!(
+                text,
+                "{},\"{method}\",\"{setting}\",{knob:e},{error},{:e},{:e},{:e},{on_front},{default}",
+                factor.name, seconds.median, seconds.low, seconds.high
+            );
+        };
         for error in &factor.errors {
             let front = factor.front(error);
             for point in &factor.points {
                 let value = point.errors.get(&error.name).copied().unwrap_or(f64::NAN);
                 let on_front = front.iter().any(|other| std::ptr::eq(*other, point));
-                // Writing to a string cannot fail.
-                let _ = writeln!(
-                    text,
-                    "{},\"{}\",\"{}\",{:e},{},{value:e},{:e},{:e},{:e},{:e},{on_front},{}",
-                    factor.name,
-                    point.method,
-                    point.setting,
-                    point.knob,
-                    error.name,
-                    error.floor,
-                    point.seconds.median,
-                    point.seconds.low,
-                    point.seconds.high,
-                    point.default
-                );
+                row(point, format!("{},{value:e},{:e}", error.name, error.floor), on_front);
             }
+        }
+        if factor.errors.is_empty() {
+            factor.points.iter().for_each(|point| row(point, ",,".to_owned(), false));
         }
     }
     text
 }
 
-/// Time against error, one plot an error.
+/// Time against error, one plot an error; against the knob where there is none.
 fn plots(factor: &Factor) -> Vec<Plot> {
-    factor.errors.iter().map(|error| plot(factor, error)).collect()
+    if factor.errors.is_empty() {
+        let growth = orders("Time grows with the power", &factor.growth());
+        return vec![plot(factor, &factor.knob, &|point| point.knob, Vec::new(), growth)];
+    }
+    let of = |error: &ErrorKind| {
+        let value = |point: &Point| point.errors.get(&error.name).copied().unwrap_or(f64::NAN);
+        let front = factor.front(error).iter().map(|point| [value(point), point.seconds.median]).collect();
+        let front = Series::new("Pareto front", front, Stroke::Underlay);
+        let floor = (error.floor > 0.0).then(|| Level { name: "floor".into(), at: error.floor, vertical: true });
+        let levels = error.levels.iter().map(|(name, at)| Level { name: name.clone(), at: *at, vertical: true });
+        let fitted = orders("Fitted orders", &factor.slopes(error));
+        let mut plot = plot(factor, &error.label, &value, vec![front], fitted);
+        plot.levels = floor.into_iter().chain(levels).collect();
+        plot
+    };
+    factor.errors.iter().map(of).collect()
 }
 
-fn plot(factor: &Factor, error: &ErrorKind) -> Plot {
-    let value = |point: &super::work_precision::Point| point.errors.get(&error.name).copied().unwrap_or(f64::NAN);
+fn plot(factor: &Factor, label: &str, value: &dyn Fn(&Point) -> f64, further: Vec<Series>, note: String) -> Plot {
     let series = |method: &str| {
-        let of_method: Vec<_> = factor.points.iter().filter(|point| point.method == method).collect();
+        let of_method: Vec<&Point> = factor.points.iter().filter(|point| point.method == method).collect();
         Series {
             whiskers: of_method.iter().map(|point| [point.seconds.low, point.seconds.high]).collect(),
             ..Series::new(
@@ -105,32 +119,22 @@ fn plot(factor: &Factor, error: &ErrorKind) -> Plot {
             )
         }
     };
-    let mut all: Vec<Series> = factor.methods().into_iter().map(series).collect();
-    if error.name != factor.knob {
-        let front = factor.front(error).iter().map(|point| [value(point), point.seconds.median]).collect();
-        all.push(Series::new("Pareto front", front, Stroke::Underlay));
-    }
-    let default = factor.points.iter().find(|point| point.default);
-    let floor = (error.floor > 0.0).then(|| Level { name: "floor".into(), at: error.floor, vertical: true });
-    let levels = error.levels.iter().map(|(name, at)| Level { name: name.clone(), at: *at, vertical: true });
+    let own = factor.points.iter().filter(|point| point.default);
     Plot {
         title: String::new(),
-        x: Axis::logarithmic(error.label.clone()),
+        x: Axis::logarithmic(label),
         y: Axis::logarithmic("time (s)"),
-        series: all,
-        levels: floor.into_iter().chain(levels).collect(),
-        marks: default
-            .map(|point| Mark { name: "this scene".into(), at: [value(point), point.seconds.median] })
-            .into_iter()
-            .collect(),
-        note: orders(&factor.slopes(error)),
+        series: factor.methods().into_iter().map(series).chain(further).collect(),
+        levels: Vec::new(),
+        marks: own.map(|point| Mark { name: "this scene".into(), at: [value(point), point.seconds.median] }).collect(),
+        note,
     }
 }
 
-fn orders(slopes: &[Slope]) -> String {
+fn orders(what: &str, slopes: &[Slope]) -> String {
     if slopes.is_empty() {
         return String::new();
     }
     let each: Vec<String> = slopes.iter().map(|slope| format!("{} {:.2}", slope.method, slope.order)).collect();
-    format!("Fitted orders: {}.", each.join("; "))
+    format!("{what}: {}.", each.join("; "))
 }

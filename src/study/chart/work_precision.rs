@@ -69,7 +69,8 @@ pub struct Factor {
     pub title: String,
     /// Name and unit of the number that is refined.
     pub knob: String,
-    /// The errors; the first is the one that settings are chosen by.
+    /// The errors; the first is the one that settings are chosen by. None where methods agree exactly: then time against the
+    /// knob is what counts.
     pub errors: Vec<ErrorKind>,
     /// All settings.
     pub points: Vec<Point>,
@@ -113,6 +114,17 @@ impl Factor {
                 .collect();
             let order = slope(&above)?;
             (above.len() >= 3).then(|| Slope { method: (*method).to_owned(), order, points: above.len() })
+        };
+        self.methods().iter().filter_map(fit).collect()
+    }
+
+    /// Exponents p of time ~ knob^p, for methods with three points or more.
+    pub fn growth(&self) -> Vec<Slope> {
+        let fit = |method: &&str| {
+            let of_method = self.points.iter().filter(|point| point.method == *method && point.knob > 0.0);
+            let pairs: Vec<[f64; 2]> = of_method.map(|point| [point.knob.ln(), point.seconds.median.ln()]).collect();
+            let order = slope(&pairs)?;
+            (pairs.len() >= 3).then(|| Slope { method: (*method).to_owned(), order, points: pairs.len() })
         };
         self.methods().iter().filter_map(fit).collect()
     }

@@ -2,9 +2,10 @@
 
 use super::chart::work_precision::{Point, Seconds};
 use super::run::{RunError, assembled, read};
-use crate::model::components::{GrowthCone, Position, SpringState};
+use crate::model::components::{GrowthCone, Journey, Site, SpringState};
 use crate::model::mechanism::Roster;
 use crate::model::stopwatch::Stopwatch;
+use crate::model::tissue::{Configuration, Tissue};
 use crate::scenario::load::{Loaded, Request};
 use crate::simulation::Simulation;
 use bevy_ecs::prelude::With;
@@ -61,6 +62,8 @@ pub struct ConeView {
     pub position: Vector3<f64>,
     /// Unit heading.
     pub heading: Vector3<f64>,
+    /// Length of its path (µm).
+    pub length: f64,
 }
 
 impl<'a> Laboratory<'a> {
@@ -154,12 +157,16 @@ pub fn run_until(simulation: &mut Simulation, stop: f64) -> Result<(), RunError>
     Ok(())
 }
 
-/// All cones, in order.
+/// All cones, in order: where their sites are now. (Positions of cones that have stopped are those of their last step.)
 pub fn cones(simulation: &Simulation) -> Vec<ConeView> {
     let world = simulation.world();
-    let query = world.try_query_filtered::<(&Position, &SpringState), With<GrowthCone>>();
-    let view =
-        |(position, spring): (&Position, &SpringState)| ConeView { position: position.0, heading: spring.heading };
+    let (mesh, now) = (&world.resource::<Tissue>().mesh, world.resource::<Configuration>());
+    let query = world.try_query_filtered::<(&Site, &SpringState, &Journey), With<GrowthCone>>();
+    let view = |(site, spring, journey): (&Site, &SpringState, &Journey)| ConeView {
+        position: now.position(mesh, *site),
+        heading: spring.heading,
+        length: journey.length,
+    };
     query.map(|mut query| query.iter(world).map(view).collect()).unwrap_or_default()
 }
 
@@ -176,7 +183,7 @@ pub fn root_mean_square(values: impl Iterator<Item = f64>) -> f64 {
 
 /// Points spread evenly over the tissue (Halton's sequence in bases 2 and 3), in the reference configuration (µm).
 pub fn spread_points(loaded: &Loaded, simulation: &Simulation, count: usize) -> Vec<[f64; 2]> {
-    let tissue = simulation.world().resource::<crate::model::tissue::Tissue>();
+    let tissue = simulation.world().resource::<Tissue>();
     let [low, high] = tissue.domain.bounding_box();
     // A point a whole cell away from the border lies inside whatever the mesh.
     let margin = 0.02 * (high[0] - low[0]).min(high[1] - low[1]).min(loaded.scene.tissue.mesh_size.0);

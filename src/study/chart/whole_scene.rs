@@ -12,14 +12,15 @@ use std::collections::BTreeMap;
 const STEPS: [f64; 4] = [0.25, 0.5, 1.0, 2.0];
 /// Mesh sizes over the scene's own, beside that itself.
 const MESHES: [f64; 2] = [0.5, 2.0];
-const KINDS: [(&str, &str); 3] = [
+const KINDS: [(&str, &str); 4] = [
     ("hits", "change of the hit fraction"),
     ("spread", "change of the spread at the highest height (um)"),
     ("fascicles", "change of the number of fascicles there"),
+    ("turning", "change of the mean turning angle (degrees)"),
 ];
 
-/// Measures of one run: hit fraction, spread (µm), fascicles; what a scene does not have is left out of means.
-type Measures = [Option<f64>; 3];
+/// Measures of one run: hit fraction, spread (µm), fascicles, turning angle (degrees); none where a scene has no such thing.
+type Measures = [Option<f64>; 4];
 
 /// Change of the measures against the time for a run, over seeds.
 ///
@@ -46,7 +47,8 @@ pub fn chart(laboratory: &Laboratory, tick: &dyn Fn(f64)) -> Result<Factor, RunE
         let levels = [("seed to seed (SD)".to_owned(), spread), ("95 % of the mean".to_owned(), of_mean)];
         ErrorKind { name: (*name).to_owned(), label: (*label).to_owned(), floor: 0.0, levels: levels.into() }
     };
-    let errors: Vec<ErrorKind> = KINDS.iter().enumerate().map(kind).collect();
+    let told = |(k, _): &(usize, &(&str, &str))| reference.iter().any(|run| run[*k].is_some_and(|value| value != 0.0));
+    let errors: Vec<ErrorKind> = KINDS.iter().enumerate().filter(told).map(kind).collect();
     let remark = format!(
         "Means over {} seeds, paired, against a quarter of the step; paths are chaotic, so changes below the 95 % line are those of \
          another draw: numerical error has stopped mattering there.",
@@ -98,7 +100,8 @@ fn runs(laboratory: &Laboratory, setting: &Setting) -> Result<(Vec<Measures>, Se
 fn measures(summary: &Summary) -> Measures {
     let highest = summary.morphology.heights.last();
     let fascicles = highest.map(|height| height.fascicles.count as f64);
-    [summary.morphology.hits.fraction, highest.and_then(|height| height.spread_um), fascicles]
+    let turning = summary.morphology.turning_angle_deg.as_ref().map(|angle| angle.mean);
+    [summary.morphology.hits.fraction, highest.and_then(|height| height.spread_um), fascicles, turning]
 }
 
 /// |mean over seeds of the paired difference|.

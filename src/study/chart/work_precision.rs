@@ -103,8 +103,11 @@ impl Factor {
         methods
     }
 
-    /// Fitted orders of an error, for methods with three points or more above the floor.
+    /// Fitted orders of an error, for methods with three points or more above the floor; none of one that is judged by levels.
     pub fn slopes(&self, error: &ErrorKind) -> Vec<Slope> {
+        if !error.levels.is_empty() {
+            return Vec::new();
+        }
         let fit = |method: &&str| {
             let of_method = self.points.iter().filter(|point| point.method == *method);
             let pairs = of_method.filter_map(|point| Some((point.knob, *point.errors.get(&error.name)?)));

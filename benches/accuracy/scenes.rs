@@ -85,9 +85,7 @@ impl Ground {
             ([numbers.between(low, self.width - radius - 8.0), numbers.between(0.25, 0.95) * self.height], radius)
         };
         let clear = |disc: &Disc| {
-            let apart = |other: &Disc| {
-                (disc.0[0] - other.0[0]).hypot(disc.0[1] - other.0[1]) > disc.1 + other.1 + 10.0
-            };
+            let apart = |other: &Disc| (disc.0[0] - other.0[0]).hypot(disc.0[1] - other.0[1]) > disc.1 + other.1 + 10.0;
             disc.0[1] + disc.1 + 8.0 < self.height && others.iter().chain(&self.hole).all(apart)
         };
         (0..200).map(|_| draw(numbers)).find(clear)
@@ -148,10 +146,7 @@ fn with_cues(scene: &mut Value, ground: &Ground, numbers: &mut Numbers) -> Vec<D
         }
         let (decay_length, degradation) = (numbers.across(30.0, 400.0), numbers.across(0.5, 10.0));
         let diffusion = degradation * decay_length * decay_length;
-        cues.insert(
-            name.into(),
-            json!({ "diffusion": diffusion, "degradation": degradation, "sources": sources }),
-        );
+        cues.insert(name.into(), json!({ "diffusion": diffusion, "degradation": degradation, "sources": sources }));
         let effect = if name == "first" || numbers.happens(0.4) { "attract" } else { "repel" };
         receptors.insert(name.into(), json!({ "effect": effect, "weight": numbers.between(0.3, 1.0) }));
     }

@@ -129,17 +129,20 @@ fn summarise(rows: &[Row]) {
     let met = rows.iter().filter(|row| row.met()).count();
     let claimed = rows.iter().filter(|row| row.claimed).count();
     let of_claimed = rows.iter().filter(|row| row.claimed && row.met()).count();
-    let mut ratios: Vec<f64> = rows.iter().map(Row::ratio).collect();
+    println!("met: {met} of {} scenes; {of_claimed} of the {claimed} that were said to be met", rows.len());
+    let mut ratios: Vec<f64> = rows.iter().filter(|row| row.met()).map(Row::ratio).collect();
+    if ratios.is_empty() {
+        return;
+    }
     ratios.sort_by(f64::total_cmp);
     let at = |share: f64| ratios[((ratios.len() - 1) as f64 * share).round() as usize];
     let below = ratios.iter().filter(|ratio| **ratio <= 2.0).count();
-    println!("met: {met} of {} scenes; {of_claimed} of the {claimed} that were said to be met", rows.len());
     println!(
-        "price over that of the cheapest fixed setting: median {:.2}, 95th percentile {:.2}, at most {:.2}; {below} of {} within 2",
+        "price over that of the cheapest fixed setting, where met: median {:.2}, 95th percentile {:.2}, at most {:.2}; {below} of {} within 2",
         at(0.5),
         at(0.95),
         at(1.0),
-        rows.len()
+        ratios.len()
     );
 }
 

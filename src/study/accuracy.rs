@@ -13,9 +13,10 @@
 //! ```
 //!
 //! A sequence ends when e ≤ 0.4 ε at two refinements in a row, K − 2 and K − 1, so that an agreement by chance does not count; or when
-//! three refinements change tips as much as all before, as paths do that separate. Pairs of places with √(e_Δt² + e_h²) ≤ 0.8 ε
-//! (the two errors are independent) are then tried in order of their work: the first is taken whose tips lie within 0.9 ε, its own
-//! tail included, of those of one run with the finest of both. Work is counted, not timed, so that the choice is the same everywhere.
+//! three refinements change tips no less than those before, as where paths separate. The two sequences say where to look: pairs of
+//! places with √(e_Δt² + e_h²) ≤ 4 ε are tried in order of their work (a step that was bad on the middling mesh may be good on a
+//! finer one), and the first is taken whose tips lie within 0.9 ε, the tail of the finest included, of those of one run with the
+//! finest of both. Work is counted, not timed, so that the choice is the same everywhere.
 //! The tolerance of the load path is ε/1000. Keys that the scene gives itself are kept. Ours: all of this.
 
 use super::laboratory::{Laboratory, run_until};
@@ -34,10 +35,10 @@ use serde::Serialize;
 /// What one part of the error may come to where its sequence ends, over the accuracy asked for.
 const SHARE: f64 = 0.4;
 /// What both parts may come to for a pair to be tried, and what one run may then show.
-const TRIED: f64 = 0.8;
+const TRIED: f64 = 4.0;
 const TAKEN: f64 = 0.9;
 /// Pairs tried at most.
-const MOST_TRIALS: usize = 8;
+const MOST_TRIALS: usize = 16;
 /// Tolerance of the load path over the accuracy.
 const LEVELS: f64 = 1e-3;
 /// Axons of a population in a pilot.
@@ -210,7 +211,7 @@ fn errors(pilots: &[Pilot]) -> Vec<f64> {
 /// Whether the last three refinements changed tips as much as all before.
 fn stagnates(changes: &[f64]) -> bool {
     let least = |changes: &[f64]| changes.iter().copied().fold(f64::INFINITY, f64::min);
-    changes.len() >= 6 && least(&changes[changes.len() - 3..]) > 0.5 * least(&changes[..changes.len() - 3])
+    changes.len() >= 8 && least(&changes[changes.len() - 3..]) > 0.8 * least(&changes[..changes.len() - 3])
 }
 
 /// Work of a run with the steps of one pilot and the mesh of another, in steps of a cone (about a microsecond).

@@ -1,43 +1,60 @@
 //! `"accuracy": ε` in place of mesh size, step and load levels: the program finds them by pilot runs.
 //!
 //! The error asked for is the root mean square, over growth cones, of the tip's displacement over the length of its path, for the
-//! scene without contact and noise (with them paths are chaotic). Pilots run a few dozen of the axons to the end of the run.
-//! A step Δt is judged by what half of it changes, a mesh size h by what h/√2 changes:
+//! scene without contact and noise (with them paths are chaotic). Pilots run up to 200 axons of a population to the end of the run:
+//! one axon whose path splits from its neighbours' may be the whole of a root mean square, so that few are left out.
+//!
+//! Two sequences of pilots are made, one that halves the step Δt on a middling mesh, one that shrinks the mesh size h by √2. Each
+//! place k of a sequence is judged against the finest, K, and what the last refinement changed, which bounds the error of the
+//! finest where methods are of order 1 in Δt (kinks of linear fields, borders) and 2 in h:
 //!
 //! ```text
-//! e(Δt) = |x(Δt) − x(Δt/2)| / (1 − 2^−1),      e(h) = |x(h) − x(h/√2)| / (1 − 2^−1)
+//! e_k = |x_k − x_K| + |x_(K−1) − x_K|
 //! ```
 //!
-//! which is the error itself where methods are of order 1 in Δt (kinks of linear fields, borders) and 2 in h, and more than the
-//! error where they are better. The largest Δt and h are taken with e ≤ 0.35 ε, each at two refinements in a row, so that an
-//! agreement by chance does not count. The tolerance of the load path is ε/1000. Keys that the scene gives itself are kept.
-//! Ours: all of this.
+//! A sequence ends when e ≤ 0.4 ε at two refinements in a row, K − 2 and K − 1, so that an agreement by chance does not count; or when
+//! three refinements change tips no less than those before, as where paths separate. The two sequences say where to look: pairs of
+//! places with √(e_Δt² + e_h²) ≤ 4 ε are tried in order of their work (a step that was bad on the middling mesh may be good on a
+//! finer one), and the first is taken whose tips lie within 0.9 ε, the tail of the finest included, of those of one run with the
+//! finest of both. Work is counted, not timed, so that the choice is the same everywhere.
+//! The tolerance of the load path is ε/1000. Keys that the scene gives itself are kept. Ours: all of this.
 
-use super::laboratory::{Laboratory, run_until};
+use super::laboratory::{Laboratory, cones, run_until};
 use super::run::{RunError, read};
-use crate::model::components::{GrowthCone, Journey, Position};
+use crate::model::health::Counters;
 use crate::model::mechanism::Roster;
 use crate::model::plan::Plan;
+use crate::model::tissue::{Configuration, Tissue};
 use crate::model::violation::pointer_token;
 use crate::scenario::load::{Loaded, Request};
-use bevy_ecs::prelude::With;
 use nalgebra::Vector3;
 use serde::Serialize;
 
-/// What one part of the error may come to, over the accuracy asked for.
-const SHARE: f64 = 0.35;
+/// What one part of the error may come to where its sequence ends, over the accuracy asked for.
+const SHARE: f64 = 0.4;
+/// What both parts may come to for a pair to be tried, and what one run may then show.
+const TRIED: f64 = 4.0;
+const TAKEN: f64 = 0.9;
+/// Pairs tried at most.
+const MOST_TRIALS: usize = 16;
 /// Tolerance of the load path over the accuracy.
 const LEVELS: f64 = 1e-3;
 /// Axons of a population in a pilot.
-const PILOT_AXONS: u64 = 40;
+const PILOT_AXONS: u64 = 200;
 /// The coarsest mesh tried: this share of the tissue's smaller extent.
-const COARSEST_MESH: f64 = 1.0 / 12.0;
+const COARSEST_MESH: f64 = 1.0 / 6.0;
+/// Place in the sequence of meshes of the one on which steps are judged.
+const MESH_FOR_STEPS: usize = 2;
 /// Steps of the coarsest clock tried.
-const FEWEST_STEPS: f64 = 64.0;
+const FEWEST_STEPS: f64 = 16.0;
 /// Refinements of each kind at most.
 const MOST_REFINEMENTS: usize = 14;
 /// A mesh of more vertices than this is not tried.
-const MOST_VERTICES: f64 = 4e5;
+const MOST_VERTICES: f64 = 1e5;
+/// Work for a vertex each time a mesh, a field or an equilibrium is gone through, in steps of a cone. Measured, as the next.
+const VERTEX_IN_A_PASS: f64 = 10.0;
+/// Work for a vertex at each stage of a tissue that moves.
+const VERTEX_AT_A_STAGE: f64 = 0.02;
 /// What pilots leave out.
 const CHAOTIC: [&str; 2] = ["fasciculation", "heading_noise"];
 
@@ -46,7 +63,9 @@ const CHAOTIC: [&str; 2] = ["fasciculation", "heading_noise"];
 pub struct Found {
     /// The accuracy asked for.
     pub asked: f64,
-    /// Estimated error of the choice, by the step and by the mesh.
+    /// Estimated error of the choice, as a whole.
+    pub estimated: f64,
+    /// Estimated error by the step and by the mesh.
     pub by_step: f64,
     /// See `by_step`.
     pub by_mesh: f64,
@@ -81,29 +100,33 @@ pub fn settled(request: &Request, roster: &Roster) -> Result<(Request, Loaded), 
 pub fn find(laboratory: &Laboratory) -> Result<Option<Found>, RunError> {
     let scene = laboratory.scene()?;
     let Some(asked) = scene.scene.accuracy.map(|accuracy| accuracy.0) else { return Ok(None) };
-    let mut search = Search { laboratory, scene: &scene, mesh: None, step: 0.0, pilots: 0, asked };
     let step_given = given(&scene, "/time/step");
     let mesh_given = given(&scene, "/tissue/mesh_size");
-    search.mesh = if mesh_given { None } else { Some(search.coarsest_mesh()) };
-    search.step = if step_given { scene.scene.time.step.0 } else { search.longest_step()? };
-    // The step is found on a coarse mesh, whose kinks make steps look worse rather than better.
-    let by_step = if step_given { 0.0 } else { search.refine_step()? };
-    let by_mesh = if mesh_given { 0.0 } else { search.refine_mesh()? };
-    let met = by_step + by_mesh <= asked;
+    let mut search = Search { laboratory, scene: &scene, mesh: None, step: scene.scene.time.step.0, pilots: 0, asked };
+    search.mesh = (!mesh_given).then(|| search.mesh_size(MESH_FOR_STEPS));
+    if !step_given {
+        search.step = search.longest_step()?;
+    }
+    let steps = if step_given { Sequence::fixed(search.step) } else { search.refined_steps()? };
+    search.step = steps.values[steps.settled];
+    let meshes = if mesh_given { Sequence::fixed(0.0) } else { search.refined_meshes()? };
+    let (step, mesh, estimated) = search.cheapest(&steps, &meshes)?;
+    search.put(&steps, step, &meshes, mesh);
+    let (by_step, by_mesh) = (steps.errors[step], meshes.errors[mesh]);
     let mut set = search.keys();
     set.push("/accuracy=null".to_owned());
-    Ok(Some(Found { asked, by_step, by_mesh, met, set, pilots: search.pilots }))
+    Ok(Some(Found { asked, estimated, by_step, by_mesh, met: estimated <= asked, set, pilots: search.pilots }))
 }
 
 impl Found {
     /// What the summary says of it.
     pub fn note(&self) -> String {
-        let Self { asked, by_step, by_mesh, met, set, pilots } = self;
+        let Self { asked, estimated, by_step, by_mesh, met, set, pilots } = self;
         let keys: Vec<&str> = set.iter().map(String::as_str).filter(|key| !key.ends_with("=null")).collect();
         let verdict = if *met { "chosen for" } else { "as near as could be afforded to" };
         format!(
-            "accuracy {asked}: {} {verdict} it; errors of {by_step:.1e} by the step and {by_mesh:.1e} by the mesh are estimated from \
-             {pilots} pilot runs without contact and noise",
+            "accuracy {asked}: {} {verdict} it; an error of {estimated:.1e} ({by_step:.1e} by the step, {by_mesh:.1e} by the mesh) is \
+             estimated from {pilots} pilot runs without contact and noise",
             keys.join(", ")
         )
     }
@@ -127,6 +150,74 @@ struct Search<'a> {
 /// Tips with the lengths of their paths.
 type Tips = Vec<(Vector3<f64>, f64)>;
 
+/// What a pilot run left.
+struct Pilot {
+    tips: Tips,
+    /// Steps of cones, steps of the clock, and vertices once for each time that they are gone through before the first step.
+    counts: Counts,
+}
+
+/// What the work of a run is reckoned from.
+#[derive(Clone, Copy, Default)]
+struct Counts {
+    cone_steps: f64,
+    stages: f64,
+    vertices: f64,
+    passes: f64,
+    moves: bool,
+}
+
+/// Values refined from place to place.
+struct Sequence {
+    values: Vec<f64>,
+    errors: Vec<f64>,
+    counts: Vec<Counts>,
+    /// The coarsest place that ends the sequence well, or the best there is.
+    settled: usize,
+    /// Bound of the finest's own error.
+    tail: f64,
+}
+
+impl Sequence {
+    /// A value that the scene gives.
+    fn fixed(value: f64) -> Self {
+        Self { values: vec![value], errors: vec![0.0], counts: vec![Counts::default()], settled: 0, tail: 0.0 }
+    }
+
+    fn of(values: Vec<f64>, pilots: &[Pilot], goal: f64) -> Self {
+        let mut errors = errors(pilots);
+        let (tail, last) = (errors.pop().unwrap_or(0.0), errors.len().saturating_sub(1));
+        let least = errors.iter().copied().fold(f64::INFINITY, f64::min);
+        let good = if errors.last().is_some_and(|error| *error <= goal) { goal } else { 1.5 * least };
+        let settled = (0..=last).rev().take_while(|&k| errors[k] <= good).last().unwrap_or(last);
+        let counts = pilots.iter().map(|pilot| pilot.counts).collect();
+        Self { values, errors, counts, settled, tail }
+    }
+
+    fn finest(&self) -> usize {
+        self.values.len() - 1
+    }
+}
+
+/// The error of each pilot by the finest of them; last that of the finest itself.
+fn errors(pilots: &[Pilot]) -> Vec<f64> {
+    let Some((finest, coarser)) = pilots.split_last() else { return Vec::new() };
+    let tail = coarser.last().map_or(0.0, |last| difference(&last.tips, &finest.tips));
+    coarser.iter().map(|pilot| difference(&pilot.tips, &finest.tips) + tail).chain([tail]).collect()
+}
+
+/// Whether the last three refinements changed tips as much as all before.
+fn stagnates(changes: &[f64]) -> bool {
+    let least = |changes: &[f64]| changes.iter().copied().fold(f64::INFINITY, f64::min);
+    changes.len() >= 8 && least(&changes[changes.len() - 3..]) > 0.8 * least(&changes[..changes.len() - 3])
+}
+
+/// Work of a run with the steps of one pilot and the mesh of another, in steps of a cone (about a microsecond).
+fn work(steps: &Counts, mesh: &Counts) -> f64 {
+    let each_stage = if mesh.moves { VERTEX_AT_A_STAGE * mesh.vertices } else { 0.0 };
+    steps.cone_steps + steps.stages * each_stage + VERTEX_IN_A_PASS * mesh.vertices * mesh.passes
+}
+
 impl Search<'_> {
     fn keys(&self) -> Vec<String> {
         let mut keys = vec![format!("/time/step={:e}", self.step)];
@@ -145,9 +236,10 @@ impl Search<'_> {
         })
     }
 
-    fn coarsest_mesh(&self) -> f64 {
+    /// Size of a place in the sequence of meshes (µm).
+    fn mesh_size(&self, place: usize) -> f64 {
         let [width, height] = self.extent();
-        COARSEST_MESH * width.min(height)
+        COARSEST_MESH * width.min(height) * 0.5f64.powf(0.5 * place as f64)
     }
 
     /// The longest step that passes no limit of the scene's plan.
@@ -160,43 +252,79 @@ impl Search<'_> {
         Ok(self.step / 2f64.powf(worst.log2().ceil()))
     }
 
-    fn refine_step(&mut self) -> Result<f64, RunError> {
+    fn refined_steps(&mut self) -> Result<Sequence, RunError> {
         let start = self.step;
-        let (place, error) = self.refine(|search, k| search.step = start * 0.5f64.powi(k as i32), usize::MAX)?;
-        self.step = start * 0.5f64.powi(place as i32);
-        Ok(error)
+        self.refined(|search, k| {
+            search.step = start * 0.5f64.powi(k as i32);
+            search.step
+        })
     }
 
-    fn refine_mesh(&mut self) -> Result<f64, RunError> {
-        let (start, [width, height]) = (self.coarsest_mesh(), self.extent());
-        let finest = (1.155 * width * height / MOST_VERTICES).sqrt();
-        let most = (2.0 * (start / finest).log2()).floor().max(1.0) as usize;
-        let size = |k: usize| start * 0.5f64.powf(0.5 * k as f64);
-        let (place, error) = self.refine(|search, k| search.mesh = Some(size(k)), most)?;
-        self.mesh = Some(size(place));
-        Ok(error)
+    fn refined_meshes(&mut self) -> Result<Sequence, RunError> {
+        self.refined(|search, k| {
+            let size = search.mesh_size(k);
+            search.mesh = Some(size);
+            size
+        })
     }
 
-    /// Refines until two estimates in a row are small; returns the place of the first of them, and the estimate there.
-    fn refine(&mut self, mut set: impl FnMut(&mut Self, usize), most: usize) -> Result<(usize, f64), RunError> {
+    fn affordable(&self) -> bool {
+        let [width, height] = self.extent();
+        self.mesh.is_none_or(|size| 1.155 * width * height <= MOST_VERTICES * size * size)
+    }
+
+    /// Refines until the errors at two places in a row are small, or no refinement helps or can be afforded.
+    fn refined(&mut self, mut set: impl FnMut(&mut Self, usize) -> f64) -> Result<Sequence, RunError> {
         let goal = SHARE * self.asked;
-        set(self, 0);
-        let mut last = self.pilot()?;
-        let mut estimates: Vec<f64> = Vec::new();
-        for k in 0..most.min(MOST_REFINEMENTS) {
-            set(self, k + 1);
-            let finer = self.pilot()?;
-            estimates.push(2.0 * difference(&last, &finer));
-            last = finer;
-            if k > 0 && estimates[k - 1] <= goal && estimates[k] <= goal {
-                return Ok((k - 1, estimates[k - 1]));
+        let (mut values, mut pilots, mut changes) = (vec![set(self, 0)], vec![self.pilot()?], Vec::new());
+        for k in 1..=MOST_REFINEMENTS {
+            let value = set(self, k);
+            if !self.affordable() {
+                break;
+            }
+            let pilot = self.pilot()?;
+            changes.push(difference(&pilots[k - 1].tips, &pilot.tips));
+            values.push(value);
+            pilots.push(pilot);
+            let settled = k >= 2 && errors(&pilots)[k - 2..k].iter().all(|error| *error <= goal);
+            if settled || stagnates(&changes) {
+                break;
             }
         }
-        let place = estimates.len().saturating_sub(1);
-        Ok((place, estimates.last().copied().unwrap_or(0.0)))
+        Ok(Sequence::of(values, &pilots, goal))
     }
 
-    fn pilot(&mut self) -> Result<Tips, RunError> {
+    fn put(&mut self, steps: &Sequence, step: usize, meshes: &Sequence, mesh: usize) {
+        self.step = steps.values[step];
+        self.mesh = self.mesh.map(|_| meshes.values[mesh]);
+    }
+
+    /// The pair of least work among those that meet the accuracy by one run with the finest of both, with its error.
+    fn cheapest(&mut self, steps: &Sequence, meshes: &Sequence) -> Result<(usize, usize, f64), RunError> {
+        let both = |i: usize, j: usize| steps.errors[i].hypot(meshes.errors[j]);
+        let settled = (steps.settled, meshes.settled, both(steps.settled, meshes.settled));
+        let places = |sequence: &Sequence| 0..sequence.errors.len();
+        let all = places(steps).flat_map(|i| places(meshes).map(move |j| (i, j)));
+        let mut pairs: Vec<_> = all.filter(|&(i, j)| both(i, j) <= TRIED * self.asked).collect();
+        if steps.finest() + meshes.finest() == 0 || pairs.is_empty() {
+            return Ok(settled);
+        }
+        let work_of = |&(i, j): &(usize, usize)| work(&steps.counts[i], &meshes.counts[j]);
+        pairs.sort_by(|a, b| work_of(a).total_cmp(&work_of(b)));
+        self.put(steps, steps.finest(), meshes, meshes.finest());
+        let finest = self.pilot()?;
+        let tail = steps.tail.hypot(meshes.tail);
+        for (i, j) in pairs.into_iter().take(MOST_TRIALS) {
+            self.put(steps, i, meshes, j);
+            let error = difference(&self.pilot()?.tips, &finest.tips) + tail;
+            if error <= TAKEN * self.asked {
+                return Ok((i, j, error));
+            }
+        }
+        Ok(settled)
+    }
+
+    fn pilot(&mut self) -> Result<Pilot, RunError> {
         self.pilots += 1;
         let without: Vec<&str> = CHAOTIC.into_iter().filter(|name| self.scene.blocks.contains_key(*name)).collect();
         let mut set = self.keys();
@@ -206,9 +334,16 @@ impl Search<'_> {
         let mut simulation = self.laboratory.assemble(&self.laboratory.load(&without, &set)?)?;
         run_until(&mut simulation, self.scene.scene.time.duration.0)?;
         let world = simulation.world();
-        let query = world.try_query_filtered::<(&Position, &Journey), With<GrowthCone>>();
-        let tip = |(position, journey): (&Position, &Journey)| (position.0, journey.length);
-        Ok(query.map(|mut query| query.iter(world).map(tip).collect()).unwrap_or_default())
+        let tips = cones(&simulation).iter().map(|cone| (cone.position, cone.length)).collect();
+        let (counters, vertices) = (world.resource::<Counters>(), world.resource::<Tissue>().mesh.vertex_count());
+        let counts = Counts {
+            cone_steps: counters.cone_steps as f64,
+            stages: counters.stages as f64,
+            vertices: vertices as f64,
+            passes: (1 + counters.cue_factorisations + 2 * counters.newton_iterations) as f64,
+            moves: world.resource::<Configuration>().moves,
+        };
+        Ok(Pilot { tips, counts })
     }
 }
 

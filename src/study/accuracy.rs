@@ -55,7 +55,8 @@ const FEWEST_STEPS: f64 = 16.0;
 const MOST_REFINEMENTS: usize = 14;
 /// A mesh of more vertices than this is not tried.
 const MOST_VERTICES: f64 = 1e5;
-/// Work for a vertex each time a mesh, a field or an equilibrium is gone through, in steps of a cone. Measured, as the next.
+/// Work for a vertex each time a mesh, a field or an equilibrium is gone through, in steps of a cone. Ours: a round
+/// number, as the next.
 const VERTEX_IN_A_PASS: f64 = 10.0;
 /// Work for a vertex at each stage of a tissue that moves.
 const VERTEX_AT_A_STAGE: f64 = 0.02;
@@ -157,7 +158,6 @@ type Tips = Vec<(Vector3<f64>, f64)>;
 /// What a pilot run left.
 struct Pilot {
     tips: Tips,
-    /// Steps of cones, steps of the clock, and vertices once for each time that they are gone through before the first step.
     counts: Counts,
 }
 

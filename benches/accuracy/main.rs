@@ -1,11 +1,12 @@
 //! Whether `"accuracy"` keeps what it says, and at what price: `cargo bench --bench accuracy`.
 //!
-//! Each scene is settled as a run would settle it. The error that is reached is measured over all axons of the scene without
-//! contact and noise, against a reference of a quarter of the mesh size (no more than 100 000 vertices) and a sixteenth of the
-//! step. The price is the time of assembly and run at the choice over that of the cheapest of a grid of fixed settings that meets the
-//! same accuracy against the same reference: mesh sizes in ratios of √2, four of them coarser than the choice and two finer, each with
-//! steps in ratios of 2 from 32 times the choice's down to a quarter of it. Seconds are those of one thread, median of three; two
-//! scenes at a time, each on a thread of its own.
+//! Each scene is settled as a run would settle it. The error that is reached is measured over all axons of the scene
+//! without contact and noise, against a reference of a quarter of the mesh size (no more than 100 000 vertices) and a
+//! sixteenth of the step. The price is the time of assembly and run at the choice over that of the cheapest of a grid
+//! of fixed settings that meets the same accuracy against the same reference: mesh sizes in ratios of √2, four of
+//! them coarser than the choice and two finer, each with steps in ratios of 2 from 32 times the choice's down to a
+//! quarter of it. Seconds are those of one thread, median of three; two scenes at a time, each on a thread of its
+//! own.
 
 mod scenes;
 
@@ -90,7 +91,8 @@ impl Numbered {
 }
 
 impl Row {
-    const HEAD: &'static str = "scene   asked  reached estimated  split  mesh um    step h  finer  seconds |  mesh um    step h  seconds  ratio | pilots s";
+    const HEAD: &'static str = "scene   asked  reached estimated  split  mesh um    step h  finer  seconds |  \
+        mesh um    step h  seconds  ratio | pilots s";
 
     fn ratio(&self) -> f64 {
         self.seconds / self.best_seconds
@@ -110,7 +112,8 @@ impl Row {
             '-'
         };
         format!(
-            "{number:>5} {asked:>7} {reached:>8.5}{mark} {estimated:>8.5} {:>6} {:>8.3} {:>9.5} {:>6.1} {seconds:>8.3} | {:>8.3} {:>9.5} \
+            "{number:>5} {asked:>7} {reached:>8.5}{mark} {estimated:>8.5} {:>6} {:>8.3} {:>9.5} {:>6.1} {seconds:>8.3} | \
+             {:>8.3} {:>9.5} \
              {best_seconds:>8.3} {:>6.2} | {:>8.2}",
             self.split,
             chosen.mesh,
@@ -137,7 +140,8 @@ fn summarise(rows: &[Row]) {
     let at = |share: f64| ratios[((ratios.len() - 1) as f64 * share).round() as usize];
     let below = ratios.iter().filter(|ratio| **ratio <= 2.0).count();
     println!(
-        "price over that of the cheapest fixed setting, where met: median {:.2}, 95th percentile {:.2}, at most {:.2}; {below} of {} within 2",
+        "price over that of the cheapest fixed setting, where met: \
+         median {:.2}, 95th percentile {:.2}, at most {:.2}; {below} of {} within 2",
         at(0.5),
         at(0.95),
         at(1.0),

@@ -1,23 +1,25 @@
 //! `"accuracy": ε` in place of mesh size, step and load levels: the program finds them by pilot runs.
 //!
-//! The error asked for is the root mean square, over growth cones, of the tip's displacement over the length of its path, for the
-//! scene without contact and noise (with them paths are chaotic). Pilots run up to 200 axons of a population to the end of the run:
-//! one axon whose path splits from its neighbours' may be the whole of a root mean square, so that few are left out.
+//! The error asked for is the root mean square, over growth cones, of the tip's displacement over the length of its
+//! path, for the scene without contact and noise (with them paths are chaotic). Pilots run up to 200 axons of a
+//! population to the end of the run: one axon whose path splits from its neighbours' may be the whole of a root mean
+//! square, so that few are left out.
 //!
-//! Two sequences of pilots are made, one that halves the step Δt on a middling mesh, one that shrinks the mesh size h by √2. Each
-//! place k of a sequence is judged against the finest, K, and what the last refinement changed, which bounds the error of the
-//! finest where methods are of order 1 in Δt (kinks of linear fields, borders) and 2 in h:
+//! Two sequences of pilots are made, one that halves the step Δt on a middling mesh, one that shrinks the mesh size h
+//! by √2. Each place k of a sequence is judged against the finest, K, and what the last refinement changed, which
+//! bounds the error of the finest where methods are of order 1 in Δt (kinks of linear fields, borders) and 2 in h:
 //!
 //! ```text
 //! e_k = |x_k − x_K| + |x_(K−1) − x_K|
 //! ```
 //!
-//! A sequence ends when e ≤ 0.4 ε at two refinements in a row, K − 2 and K − 1, so that an agreement by chance does not count; or when
-//! three refinements change tips no less than those before, as where paths separate. The two sequences say where to look: pairs of
-//! places with √(e_Δt² + e_h²) ≤ 4 ε are tried in order of their work (a step that was bad on the middling mesh may be good on a
-//! finer one), and the first is taken whose tips lie within 0.9 ε, the tail of the finest included, of those of one run with the
-//! finest of both. Work is counted, not timed, so that the choice is the same everywhere.
-//! The tolerance of the load path is ε/1000. Keys that the scene gives itself are kept. Ours: all of this.
+//! A sequence ends when e ≤ 0.4 ε at two refinements in a row, K − 2 and K − 1, so that an agreement by chance does
+//! not count; or when three refinements change tips no less than those before, as where paths separate. The two
+//! sequences say where to look: pairs of places with √(e_Δt² + e_h²) ≤ 4 ε are tried in order of their work (a step
+//! that was bad on the middling mesh may be good on a finer one), and the first is taken whose tips lie within 0.9 ε,
+//! the tail of the finest included, of those of one run with the finest of both. Work is counted, not timed, so that
+//! the choice is the same everywhere. The tolerance of the load path is ε/1000. Keys that the scene gives itself are
+//! kept. Ours: all of this.
 
 use super::laboratory::{Laboratory, cones, run_until};
 use super::run::{RunError, read};
@@ -51,7 +53,8 @@ const FEWEST_STEPS: f64 = 16.0;
 const MOST_REFINEMENTS: usize = 14;
 /// A mesh of more vertices than this is not tried.
 const MOST_VERTICES: f64 = 1e5;
-/// Work for a vertex each time a mesh, a field or an equilibrium is gone through, in steps of a cone. Measured, as the next.
+/// Work for a vertex each time a mesh, a field or an equilibrium is gone through, in steps of a cone. Ours: a round
+/// number, as the next.
 const VERTEX_IN_A_PASS: f64 = 10.0;
 /// Work for a vertex at each stage of a tissue that moves.
 const VERTEX_AT_A_STAGE: f64 = 0.02;
@@ -153,7 +156,6 @@ type Tips = Vec<(Vector3<f64>, f64)>;
 /// What a pilot run left.
 struct Pilot {
     tips: Tips,
-    /// Steps of cones, steps of the clock, and vertices once for each time that they are gone through before the first step.
     counts: Counts,
 }
 

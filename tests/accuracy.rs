@@ -100,6 +100,17 @@ fn keys_that_are_given_are_kept_and_those_found_are_told() {
 }
 
 #[test]
+fn a_scene_that_leaves_nothing_to_choose_is_refused_with_the_place() {
+    let mut scene = scene(json!({ "time": { "duration": 6, "step": "3 min" } }));
+    scene["tissue"]["mesh_size"] = json!(20);
+    let folder = Folder::new();
+    let path = folder.write("scene.json", &scene.to_string());
+    let request = Request { path, without: Vec::new(), set: Vec::new() };
+    let refused = settled(&request, &systems::standard()).unwrap_err().to_string();
+    assert!(refused.contains("/accuracy") && refused.contains("/tissue/mesh_size"), "{refused}");
+}
+
+#[test]
 fn a_scene_without_accuracy_is_left_as_it_is() {
     let mut scene = scene(json!({}));
     scene.as_object_mut().unwrap().remove("accuracy");

@@ -27,8 +27,8 @@ use crate::model::health::Counters;
 use crate::model::mechanism::Roster;
 use crate::model::plan::Plan;
 use crate::model::tissue::{Configuration, Tissue};
-use crate::model::violation::pointer_token;
-use crate::scenario::load::{Loaded, Request};
+use crate::model::violation::{Violation, pointer_token};
+use crate::scenario::load::{Loaded, Request, ScenarioErrors};
 use nalgebra::Vector3;
 use serde::Serialize;
 
@@ -99,12 +99,18 @@ pub fn settled(request: &Request, roster: &Roster) -> Result<(Request, Loaded), 
 /// Finds the cheapest settings for a scene that states an accuracy; none for one that does not.
 ///
 /// # Errors
-/// A scene that cannot be assembled or run.
+/// A scene that gives step and mesh size itself, or that cannot be assembled or run.
 pub fn find(laboratory: &Laboratory) -> Result<Option<Found>, RunError> {
     let scene = laboratory.scene()?;
     let Some(asked) = scene.scene.accuracy.map(|accuracy| accuracy.0) else { return Ok(None) };
     let step_given = given(&scene, "/time/step");
     let mesh_given = given(&scene, "/tissue/mesh_size");
+    if step_given && mesh_given {
+        let message =
+            "nothing is left to choose: the scene gives /time/step and /tissue/mesh_size; leave one of them out";
+        let problems = vec![Violation::new("/accuracy", message)];
+        return Err(RunError::Scenario(ScenarioErrors { path: laboratory.request.path.clone(), problems }));
+    }
     let mut search = Search { laboratory, scene: &scene, mesh: None, step: scene.scene.time.step.0, pilots: 0, asked };
     search.mesh = (!mesh_given).then(|| search.mesh_size(MESH_FOR_STEPS));
     if !step_given {

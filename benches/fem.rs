@@ -86,7 +86,7 @@ fn probe_errors(gradient: impl Fn([f64; 2], usize) -> Option<Vector2<f64>>) -> (
     let pair = |v: &Value| [v[0].as_f64().unwrap_or(f64::NAN), v[1].as_f64().unwrap_or(f64::NAN)];
     let pairs = |v: &Value| -> Vec<[f64; 2]> { v.as_array().into_iter().flatten().map(pair).collect() };
     let probes = pairs(&reference["probes"]);
-    let (mut size, mut angle, mut count) = (0.0, 0.0, 0.0);
+    let (mut size, mut angle, mut count) = (0.0, 0.0, 0.0f64);
     for (k, ligand) in ["a", "r"].into_iter().enumerate() {
         let fields = reference["fields"].as_array().expect("fields");
         let field = fields.iter().find(|field| field["ligand"] == ligand).expect("a field");
@@ -97,7 +97,7 @@ fn probe_errors(gradient: impl Fn([f64; 2], usize) -> Option<Vector2<f64>>) -> (
             count += 1.0;
         }
     }
-    ((size / count as f64).sqrt(), (angle / count).sqrt())
+    ((size / count).sqrt(), (angle / count).sqrt())
 }
 
 fn matrix(size: f64) {

@@ -118,7 +118,7 @@ pub fn scene(number: u64) -> (Value, f64) {
     if numbers.happens(0.4) {
         scene["borders"] = json!({ "range": numbers.between(3.0, 15.0) });
     }
-    if number % 3 != 0 {
+    if !number.is_multiple_of(3) {
         let share = numbers.between(0.05, 0.25);
         let top = match number % 3 {
             1 => json!({ "outward": share }),

@@ -81,9 +81,9 @@ pub(super) fn draw_polylines(svg: &mut Svg, pieces: &[Vec<[f64; 2]>], colour: &s
 /// One mark: disc, square, diamond or triangle, filled for the first four series and hollow for the next.
 pub(super) fn draw_mark(svg: &mut Svg, index: usize, [x, y]: [f64; 2]) {
     let colour = colour_of(index);
-    let fill = if index / 4 % 2 == 0 { colour.as_str() } else { "#ffffff" };
+    let fill = if (index / 4).is_multiple_of(2) { colour.as_str() } else { "#ffffff" };
     let style = [("fill", fill), ("stroke", colour.as_str()), ("stroke-width", "1.2")];
-    if index % 4 == 0 {
+    if index.is_multiple_of(4) {
         let [x, y, r] = [x, y, MARK].map(number);
         return svg.element("circle", &[&[("cx", x.as_str()), ("cy", &y), ("r", &r)], &style[..]].concat());
     }

@@ -22,8 +22,10 @@ const MOMENTS: [f64; 6] = [0.07, 0.19, 0.37, 0.56, 0.73, 0.93];
 const KINDS: [(&str, &str); 2] =
     [("displacement", "relative rms error of U"), ("velocity", "relative rms error of the tissue's velocity")];
 
-/// Displacements and velocities at points and moments.
-type Motion = Vec<(Vector3<f64>, Vector3<f64>)>;
+/// Displacement and velocity at a point and a moment.
+type Moved = (Vector3<f64>, Vector3<f64>);
+/// Those at all points and moments.
+type Motion = Vec<Moved>;
 
 /// Errors of the matrix against its time, by mesh size and by load levels; none where it does not move.
 ///
@@ -174,7 +176,7 @@ fn kinds(floor: &BTreeMap<String, f64>) -> Vec<ErrorKind> {
 }
 
 fn errors(found: &Motion, exact: &Motion) -> BTreeMap<String, f64> {
-    let relative = |of: fn(&(Vector3<f64>, Vector3<f64>)) -> Vector3<f64>| {
+    let relative = |of: fn(&Moved) -> Vector3<f64>| {
         let difference = root_mean_square(found.iter().zip(exact).map(|(a, b)| (of(a) - of(b)).norm()));
         let size = root_mean_square(exact.iter().map(|b| of(b).norm()));
         if size > 0.0 { difference / size } else { difference }

@@ -39,8 +39,9 @@ mod tests {
     fn it_is_one_at_rest_and_gone_where_the_confined_block_loses_it() {
         let fitted = triangulate(&PlanarDomain::rectangle(1.5, 1.0), &[], &MeshOptions::of_size(0.25)).unwrap();
         let lame = Lame::from_young_poisson(1.0, 0.3).unwrap();
-        let count = fitted.mesh.vertex_count();
-        let body = Body::new(&fitted.mesh, Arc::new(StVenantKirchhoff { lame }), Prescribed::none(count)).unwrap();
+        let mut held = Prescribed::none(fitted.mesh.vertex_count());
+        (0..2).for_each(|vertex| (0..2).for_each(|k| held.impose(vertex, k, 0.0)));
+        let body = Body::new(&fitted.mesh, Arc::new(StVenantKirchhoff { lame }), held).unwrap();
         let squeezed = |stretch: f64| -> Vec<f64> {
             fitted.mesh.vertices().iter().flat_map(|x| [0.0, (stretch - 1.0) * x[1]]).collect()
         };

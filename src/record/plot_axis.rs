@@ -91,8 +91,9 @@ impl Scale {
         let rough = (self.high - self.low) / (MOST_TICKS - 1.0);
         let decade = 10f64.powf(rough.log10().floor());
         let step = [1.0, 2.0, 5.0, 10.0].into_iter().map(|m| m * decade).find(|step| *step >= rough).unwrap_or(rough);
-        let first = (self.low / step).ceil() as i64;
-        let last = (self.high / step).floor() as i64;
+        // An end that is a tick but for round-off has it.
+        let first = (self.low / step - 1e-9).ceil() as i64;
+        let last = (self.high / step + 1e-9).floor() as i64;
         let tick = |i: i64| self.share(i as f64 * step).map(|share| (share, word(tidy(i as f64 * step, step))));
         (first..=last).filter_map(tick).collect()
     }

@@ -43,7 +43,10 @@ fn margin(plan: &ScenePlan, name: &str) -> Option<f64> {
 fn the_plan_says_how_much_of_ellipticity_a_compression_uses_up() {
     let squeezed = |outward: f64| {
         let slides = json!({ "outward": outward, "sideways": "sliding" });
-        let found = planned(&changed(|scene| scene["matrix"] = json!({ "motion": { "top": slides } })));
+        let found = planned(&changed(|scene| {
+            scene["matrix"] =
+                json!({ "motion": { "top": slides, "bottom": { "outward": 0.0, "sideways": "sliding" } } })
+        }));
         margin(&found, "ellipticity").unwrap()
     };
     let (stretched, slightly, strongly) = (squeezed(0.2), squeezed(-0.05), squeezed(-0.2));

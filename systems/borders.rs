@@ -106,19 +106,18 @@ fn edge_pull(
     x: Vector3<f64>,
     range: f64,
 ) -> Vector3<f64> {
-    let mut nearest = (f64::INFINITY, Vector3::zeros());
+    let (mut nearest, mut away, mut along) = (f64::INFINITY, Vector3::zeros(), Vector3::zeros());
     for facet in facets {
         let [a, b] = facet_ends(tissue, configuration, *facet);
-        let along = b - a;
-        let share = ((x - a).dot(&along) / along.norm_squared()).clamp(0.0, 1.0);
-        let away = x - (a + along * share);
-        let distance = away.norm();
-        if distance < nearest.0 {
-            let normal = Vector3::new(-along.y, along.x, 0.0).normalize();
-            nearest = (distance, if distance > 0.0 { away / distance } else { normal });
+        let share = ((x - a).dot(&(b - a)) / (b - a).norm_squared()).clamp(0.0, 1.0);
+        let from_facet = x - (a + (b - a) * share);
+        if from_facet.norm_squared() < nearest {
+            (nearest, away, along) = (from_facet.norm_squared(), from_facet, b - a);
         }
     }
-    nearest.1 * (-nearest.0 / range).exp()
+    let distance = nearest.sqrt();
+    let inward = if distance > 0.0 { away / distance } else { Vector3::new(-along.y, along.x, 0.0).normalize() };
+    inward * (-distance / range).exp()
 }
 
 fn facet_ends(tissue: &Tissue, configuration: &Configuration, facet: BorderFacet) -> [Vector3<f64>; 2] {

@@ -14,19 +14,9 @@
 
 use super::shaft_index::{Asking, Search, ShaftIndex, ShaftScene};
 use crate::numerics::contact_integral::Felt;
-use crate::numerics::segments::Sensed;
+use crate::numerics::segments::{ContactPull, Contacts, Touch};
 use crate::prelude::*;
 use std::collections::BTreeMap;
-
-/// How the shafts near a growth cone are found. Results do not depend on it, to the last bit.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum Neighbours {
-    /// By an R-tree.
-    Tree,
-    /// By looking at every segment of every shaft: slow, and there to be compared with.
-    All,
-}
 
 keys! {
     /// Homophilic attraction to the shafts of other axons; L̂ += λ_f F.
@@ -51,7 +41,7 @@ keys! {
         /// Adhesion h between populations, row (who feels) by column (who is felt); 1 where nothing is given. Ours.
         pub adhesion: BTreeMap<String, BTreeMap<String, Factor>> = BTreeMap::new(),
         /// How shafts near a cone are found. Ours.
-        pub neighbours: Neighbours = Neighbours::Tree,
+        pub neighbours: Search = Search::Tree,
     }
 }
 
@@ -89,11 +79,7 @@ impl Mechanism for Fasciculation {
         );
         plan.keep("shaft index", format!("fasciculation feels shafts within {} um", self.reach.0));
         model.pulls_up_to(self.weight.0);
-        let search = match self.neighbours {
-            Neighbours::Tree => Search::Tree,
-            Neighbours::All => Search::All,
-        };
-        ShaftIndex::install(model, self.reach.0, search);
+        ShaftIndex::install(model, self.reach.0, self.neighbours);
         model.insert(table).insert_law(self).term(Term::Contact, attract);
         Ok(())
     }
@@ -157,24 +143,16 @@ impl From<&Fasciculation> for ContactLaw {
     }
 }
 
-impl ContactLaw {
-    /// The pull of all that was felt, each segment times the adhesion to its shaft; not yet limited to 1.
-    #[inline]
-    fn pull<const D: usize>(&self, sensed: &Sensed<D>, adhesion: impl Fn(u32) -> f64) -> [f64; D] {
-        let reach = self.felt.reach;
-        let toward = 6.75 * self.attraction / (reach * reach);
+impl<const D: usize> ContactPull<D> for ContactLaw {
+    #[inline(always)]
+    fn pull(&self, touch: &Touch<D>) -> [f64; D] {
+        let toward = 6.75 * self.attraction / (self.felt.reach * self.felt.reach);
         let backwards = if self.follow_backwards { -1.0 } else { 0.0 };
-        let direction = |along: f64| if along < 0.0 { backwards } else { f64::from(along > 0.0) };
-        let mut sum = [0.0; D];
-        for touch in sensed.touches() {
-            let [w0, w1] = touch.moments;
-            let tangential = toward * w1 + self.alignment * direction(touch.along) * w0 / reach;
-            let h = adhesion(touch.owner);
-            for (k, sum) in sum.iter_mut().enumerate() {
-                *sum += (touch.normal[k] * (toward * w0) + touch.tangent[k] * tangential) * h;
-            }
-        }
-        sum
+        let forwards = if touch.along > 0.0 { 1.0 } else { 0.0 };
+        let direction = if touch.along < 0.0 { backwards } else { forwards };
+        let [w0, w1] = touch.moments;
+        let tangential = toward * w1 + self.alignment / self.felt.reach * direction * w0;
+        std::array::from_fn(|k| touch.normal[k] * (toward * w0) + touch.tangent[k] * tangential)
     }
 }
 
@@ -196,11 +174,11 @@ fn attract(
         heading: spring.heading,
     });
     counters.neighbour_queries += asking.len() as u64;
-    let pulls = index.for_each(&scene, &asking, |sensed: &mut Sensed<2>, cone, segments| {
-        let (x, e) = (cone.position.xy().into(), cone.heading.xy().into());
-        sensed.sense(&contact.felt, x, e, segments, cone.index);
+    let pulls = index.for_each(&scene, &asking, |contacts: &mut Contacts<2>, cone, segments| {
+        let state = (cone.position.xy().into(), cone.heading.xy().into());
         let row = table.row(cone.population);
-        let [x, y] = contact.pull(sensed, |shaft| row[axons.0[shaft as usize] as usize]);
+        let adhesion = |shaft: u32| row[axons.0[shaft as usize] as usize];
+        let [x, y] = contacts.sum(state, segments, cone.index, (&contact.felt, &contact), adhesion);
         let sum = Vector3::new(x, y, 0.0);
         sum / sum.norm().max(1.0)
     });
@@ -218,10 +196,9 @@ mod tests {
 
     /// The pull of the segment from `a` to `b`, relative to the cone.
     fn pull(law: &ContactLaw, a: Vector3<f64>, b: Vector3<f64>, e: Vector3<f64>) -> Vector3<f64> {
-        let (mut segments, mut sensed) = (Segments::default(), Sensed::<3>::default());
+        let (mut segments, mut contacts) = (Segments::default(), Contacts::<3>::default());
         segments.push(a.into(), b.into(), 0);
-        sensed.sense(&law.felt, [0.0; 3], e.into(), &segments, 1);
-        law.pull(&sensed, |_| 1.0).into()
+        contacts.sum(([0.0; 3], e.into()), &segments, 1, (&law.felt, law), |_| 1.0).into()
     }
 
     /// The integral by brute force: many midpoints, the sector tested point by point.

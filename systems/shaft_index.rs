@@ -16,6 +16,7 @@ use crate::numerics::locate::MaterialPoint;
 use crate::numerics::segments::Segments;
 use crate::prelude::*;
 use nalgebra::Vector2;
+use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 use rstar::primitives::GeomWithData;
 use rstar::{AABB, RTree};
@@ -55,13 +56,14 @@ impl<T: Default> Pool<T> {
     }
 }
 
-/// How segments near a cone are found.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+/// How the shafts near a growth cone are found. Results do not depend on it, to the last bit.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
 pub enum Search {
-    /// By the tree.
+    /// By an R-tree.
     #[default]
     Tree,
-    /// By looking at all of them.
+    /// By looking at every segment of every shaft: slow, and there to be compared with.
     All,
 }
 
@@ -91,8 +93,38 @@ pub struct ShaftIndex {
     places: Places,
 }
 
-/// Positions now (µm) of a block's vertices, and of the point that the last of them leads to.
-type Polyline = [[f64; 2]; BLOCK + 1];
+/// Positions now (µm) of a block's vertices, and of the point that the last of them leads to, coordinate by coordinate.
+type Polyline = [[f64; BLOCK + 1]; 2];
+
+/// Which of the listed segments have a bounding box that meets the one from `low` to `high`: the list's bits, less. Compiled once
+/// for each register width.
+struct Meet<'a> {
+    positions: &'a [Polyline],
+    list: &'a [Part],
+    box_: [Vector2<f64>; 2],
+    met: &'a mut Vec<Part>,
+}
+
+impl WithSimd for Meet<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        let [low, high] = self.box_;
+        let meets = |line: &[f64; BLOCK + 1], i: usize, low: f64, high: f64| {
+            (line[i].max(line[i + 1]) >= low) & (line[i].min(line[i + 1]) <= high)
+        };
+        self.met.clear();
+        for &(block, vertices) in self.list {
+            let [x, y] = &self.positions[block as usize];
+            let near = |i: usize| meets(x, i, low.x, high.x) & meets(y, i, low.y, high.y);
+            let bits = (0..BLOCK).fold(0, |bits, i| bits | (u16::from(near(i)) << i)) & vertices;
+            if bits != 0 {
+                self.met.push((block, bits));
+            }
+        }
+    }
+}
 
 /// Polylines of the blocks that some list names, each found once for all squares.
 #[derive(Debug, Default)]
@@ -107,7 +139,7 @@ impl Places {
     /// Finds the blocks of all lists.
     fn bring_up_to_date<'a>(&mut self, scene: &ShaftScene, listed: impl Iterator<Item = &'a Part>) {
         let (now, blocks) = (scene.configuration.revision + 1, scene.shafts.block_count());
-        self.positions.resize(blocks, [[0.0; 2]; BLOCK + 1]);
+        self.positions.resize(blocks, [[0.0; BLOCK + 1]; 2]);
         self.revisions.resize(blocks, 0);
         self.stale.resize(blocks, false);
         for &(block, _) in listed {
@@ -155,15 +187,16 @@ impl ShaftIndex {
         order.sort_unstable();
         self.prepare(scene, &order);
         let groups: Vec<&[(Square, u32)]> = order.chunk_by(|a, b| a.0 == b.0).collect();
-        let (columns, workplaces) = (Pool::<Segments<2>>::default(), Pool::<S>::default());
+        let (columns, workplaces) = (Pool::<(Segments<2>, Vec<Part>)>::default(), Pool::<S>::default());
+        let arch = Arch::new();
         let serve = |segments: &Segments<2>, part: &[(Square, u32)]| -> Vec<(u32, T)> {
             let each = |work: &mut S| part.iter().map(|&(_, i)| (i, act(work, &cones[i as usize], segments))).collect();
             workplaces.lend(each)
         };
         let serve_group = |group: &&[(Square, u32)]| -> Vec<(u32, T)> {
-            columns.lend(|segments| {
-                self.gather(scene, group, cones, segments);
-                let segments = &*segments;
+            columns.lend(|columns| {
+                self.gather((scene, arch), group, cones, columns);
+                let segments = &columns.0;
                 group.par_chunks(SHARED).with_max_len(1).map(|part| serve(segments, part)).flatten_iter().collect()
             })
         };
@@ -203,20 +236,33 @@ impl ShaftIndex {
     }
 
     /// The segments of a square's list that come near any cone of a group.
-    fn gather(&self, scene: &ShaftScene, group: &[(Square, u32)], cones: &[Asking], segments: &mut Segments<2>) {
+    fn gather(
+        &self,
+        (scene, arch): (&ShaftScene, Arch),
+        group: &[(Square, u32)],
+        cones: &[Asking],
+        columns: &mut (Segments<2>, Vec<Part>),
+    ) {
         let positions = || group.iter().map(|(_, i)| cones[*i as usize].position.xy());
         let low = positions().fold(Vector2::repeat(f64::INFINITY), |m, x| m.inf(&x)).add_scalar(-self.reach);
         let high = positions().fold(Vector2::repeat(f64::NEG_INFINITY), |m, x| m.sup(&x)).add_scalar(self.reach);
-        let everything = self.search == Search::All;
+        let list = &self.lists[&group[0].0];
+        let (segments, met) = columns;
         segments.clear();
-        for &(block, vertices) in &self.lists[&group[0].0] {
-            let (polyline, owner) = (&self.places.positions[block as usize], scene.shafts.block_owner(block));
-            for ends in polyline.windows(2).enumerate().filter(|(i, _)| vertices >> i & 1 == 1).map(|(_, ends)| ends) {
-                let (start, end) = (ends[0], ends[1]);
-                let apart = |k: usize| start[k].max(end[k]) < low[k] || start[k].min(end[k]) > high[k];
-                if everything || !apart(0) && !apart(1) {
-                    segments.push(start, end, owner);
-                }
+        let near = match self.search {
+            Search::All => list,
+            Search::Tree => {
+                arch.dispatch(Meet { positions: &self.places.positions, list, box_: [low, high], met });
+                &*met
+            }
+        };
+        for &(block, vertices) in near {
+            let ([x, y], owner) = (&self.places.positions[block as usize], scene.shafts.block_owner(block));
+            let mut rest = vertices;
+            while rest != 0 {
+                let i = rest.trailing_zeros() as usize;
+                segments.push([x[i], y[i]], [x[i + 1], y[i + 1]], owner);
+                rest &= rest - 1;
             }
         }
     }
@@ -286,15 +332,15 @@ impl ShaftScene<'_> {
 
     /// Positions now (µm) of a block's vertices and of the point after them; zeros for vertices not yet stored.
     fn polyline(&self, block: u32) -> Polyline {
-        let mut positions = [[0.0; 2]; BLOCK + 1];
+        let mut positions = [[0.0; BLOCK + 1]; 2];
         let vertices = self.shafts.block_vertices(block);
         let after = match self.shafts.block_after(block) {
             Some(next) => self.shafts.point(self.shafts.block_vertices(next).start),
             None => self.shafts.tip(self.shafts.block_owner(block)),
         };
         let points = vertices.map(|vertex| self.shafts.point(vertex)).chain([after]);
-        for (position, point) in positions.iter_mut().zip(points) {
-            *position = self.position(point);
+        for (i, point) in points.enumerate() {
+            [positions[0][i], positions[1][i]] = self.position(point);
         }
         positions
     }

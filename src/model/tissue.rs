@@ -150,13 +150,13 @@ impl Configuration {
         if !self.moves {
             return 1.0;
         }
-        let of_cell = |cell: u32| {
+        let square_in_cell = |cell: u32| {
             let f = self.deformation_gradient(mesh, cell);
             let (half, det) = (0.5 * f.norm_squared(), f.determinant());
-            (half + (half * half - det * det).max(0.0).sqrt()).sqrt() / det
+            (half + (half * half - det * det).max(0.0).sqrt()) / (det * det)
         };
         let cells = (0..mesh.cell_count() as u32).into_par_iter().with_min_len(1024);
-        cells.map(of_cell).reduce(|| 0.0, f64::max) * (1.0 + 1e-12)
+        cells.map(square_in_cell).reduce(|| 0.0, f64::max).sqrt() * (1.0 + 1e-12)
     }
 }
 
@@ -169,7 +169,7 @@ fn gradient_of(mesh: &SimplexMesh<2>, field: &[[f64; 2]], cell: u32) -> Matrix2<
     let reference = columns(mesh.vertices());
     let det = reference.determinant();
     let adjugate = Matrix2::new(reference[(1, 1)], -reference[(0, 1)], -reference[(1, 0)], reference[(0, 0)]);
-    columns(field) * adjugate / det
+    columns(field) * adjugate * (1.0 / det)
 }
 
 /// Sorts the facets of an edge by where they lie along the rings of the outline.

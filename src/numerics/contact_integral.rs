@@ -38,8 +38,8 @@ pub struct Felt {
     pub cos_sector: f64,
 }
 
-/// How much of a segment is felt, as far as its ends tell (both sector and what lies behind it are convex for
-/// Θ ≥ 90°, up to the rim).
+/// How much of a segment is felt, as far as a few products tell. For Θ ≥ 90° what lies behind is convex, and the margin by which
+/// a point of the line lies in it is a concave function of its place: it is largest at an end, or where the line comes nearest.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(u64)]
 pub enum View {
@@ -72,14 +72,18 @@ impl Felt {
         let Sight { gap, first, last, along, across } = *sight;
         let outside = larger(larger(first, -last), 0.0);
         let within = gap + outside * outside < self.reach * self.reach;
-        let cosine = if self.cos_sector > 0.0 { f64::INFINITY } else { self.cos_sector };
+        let (everywhere, wide) = (self.cos_sector < -1.0, self.cos_sector <= 0.0);
+        let c2 = self.cos_sector * self.cos_sector;
         let ends = [across + along * first, across + along * last];
         let squares = [gap + first * first, gap + last * last];
-        let behind = |k: usize| (ends[k] < 0.0) & (ends[k] * ends[k] >= cosine * cosine * squares[k]);
-        let ahead = (ends[0] >= 0.0) & (ends[1] >= 0.0) & (self.cos_sector <= 0.0);
-        let everywhere = self.cos_sector < -1.0;
-        let nothing = !within | (!everywhere & behind(0) & behind(1));
-        let felt = if ahead | everywhere { View::Whole } else { View::Part };
+        let behind = |k: usize| (ends[k] < 0.0) & (ends[k] * ends[k] >= c2 * squares[k]);
+        let nothing = !within | (wide & !everywhere & behind(0) & behind(1));
+        // A line that is steeper than the cone behind enters it at one end; one less steep misses it, or passes through.
+        let flat = c2 - along * along;
+        let misses = (flat > 0.0) & ((across >= 0.0) | (across * across < gap * flat));
+        let stays_out = (flat <= 0.0) & !behind(0) & !behind(1);
+        let ahead = (ends[0] >= 0.0) & (ends[1] >= 0.0);
+        let felt = if everywhere | (wide & (ahead | misses | stays_out)) { View::Whole } else { View::Part };
         if nothing { View::Nothing } else { felt }
     }
 
@@ -317,6 +321,28 @@ mod tests {
                 View::Part => assert!(found[0] > 0.1),
             }
         }
+    }
+
+    #[test]
+    fn what_is_seen_whole_has_no_part_behind_wherever_it_lies() {
+        let felt = Felt { reach: 10.0, cos_sector: -0.5 };
+        let (mut whole, mut part) = (0, 0);
+        for i in 0..20_000 {
+            let share = |k: u32| (f64::from(i) * 0.618_033_988_75 * f64::from(2 * k + 1)).fract();
+            let (n, angle, first) = (9.0 * share(0), std::f64::consts::TAU * share(1), 20.0 * share(2) - 10.0);
+            let sight =
+                Sight { gap: n * n, first, last: first + 12.0 * share(3), along: angle.cos(), across: n * angle.sin() };
+            match felt.view(&sight) {
+                View::Whole => {
+                    let (all, cut) = (felt.moments_within_reach(&sight), felt.moments_within_sector(&sight));
+                    assert!((0..2).all(|k| (all[k] - cut[k]).abs() < 1e-12), "{sight:?}: {all:?} {cut:?}");
+                    whole += 1;
+                }
+                View::Part => part += 1,
+                View::Nothing => assert!(felt.moments_within_sector(&sight)[0].abs() < 1e-12, "{sight:?}"),
+            }
+        }
+        assert!(whole > 2 * part && part > 100, "{whole} whole, {part} in part");
     }
 
     #[test]

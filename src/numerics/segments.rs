@@ -1,9 +1,9 @@
 //! Straight segments as columns, and what a cone feels of them.
 //!
-//! One pass over the columns tells which segments are felt; those are copied together, whole ones before those that the
-//! sector cuts, and a second pass integrates them. Both passes run in the widest vector registers that the processor has; since
-//! every segment is treated by itself with the same operations, the bits do not depend on that width. The order of what is
-//! felt depends only on the segments that are felt.
+//! One pass over the columns tells which segments are felt; those are copied together in batches, whole ones before those that
+//! the sector cuts, and a second pass integrates and sums them. Both passes run in the widest vector registers that the
+//! processor has; since every segment is treated by itself with the same operations, and sums are taken in a fixed number of
+//! lanes, the bits do not depend on that width. The order of a sum depends only on the segments that are felt.
 
 use super::contact_integral::{Felt, Sight, View};
 use pulp::{Arch, Simd, WithSimd};
@@ -62,16 +62,11 @@ impl<const D: usize> Segments<D> {
     }
 }
 
-/// What a cone feels of the segments around it, as columns of equal length.
-#[derive(Debug)]
-pub struct Sensed<const D: usize> {
-    arch: Arch,
-    views: Vec<u64>,
-    picked: [Vec<u32>; 2],
-    felt: Segments<D>,
-    normal: [Vec<f64>; D],
-    moments: [Vec<f64>; 2],
-    along: Vec<f64>,
+/// What a contact law makes of one segment that is felt. Implementations are marked `inline(always)`, so that they are compiled
+/// with the loop that calls them, in vector registers.
+pub trait ContactPull<const D: usize> {
+    /// The pull of a touch, for an adhesion of 1.
+    fn pull(&self, touch: &Touch<D>) -> [f64; D];
 }
 
 /// One segment that is felt.
@@ -85,68 +80,89 @@ pub struct Touch<const D: usize> {
     pub moments: [f64; 2],
     /// Cosine of the angle between tangent and heading.
     pub along: f64,
-    /// The shaft it belongs to.
-    pub owner: u32,
 }
 
-impl<const D: usize> Default for Sensed<D> {
+/// Segments integrated at a time: what they need lies in the nearest cache.
+const BATCH: usize = 64;
+/// Partial sums; the order of summation depends on this number, never on the width of registers.
+const LANES: usize = 8;
+const _: () = assert!(BATCH.is_multiple_of(LANES));
+
+/// Work memory of a cone that sums what it feels.
+#[derive(Debug)]
+pub struct Contacts<const D: usize> {
+    arch: Arch,
+    views: Vec<u64>,
+    picked: [Vec<u32>; 2],
+    batch: Batch<D>,
+}
+
+/// Segments that are felt, copied together, with the adhesion to each.
+#[derive(Debug)]
+struct Batch<const D: usize> {
+    start: [[f64; BATCH]; D],
+    tangent: [[f64; BATCH]; D],
+    length: [f64; BATCH],
+    adhesion: [f64; BATCH],
+    pull: [[f64; BATCH]; D],
+}
+
+impl<const D: usize> Default for Contacts<D> {
     fn default() -> Self {
-        Self {
-            arch: Arch::new(),
-            views: Vec::new(),
-            picked: Default::default(),
-            felt: Segments::default(),
-            normal: [(); D].map(|()| Vec::new()),
-            moments: Default::default(),
-            along: Vec::new(),
-        }
+        let zeros = [0.0; BATCH];
+        let batch = Batch { start: [zeros; D], tangent: [zeros; D], length: zeros, adhesion: zeros, pull: [zeros; D] };
+        Self { arch: Arch::new(), views: Vec::new(), picked: Default::default(), batch }
     }
 }
 
-impl<const D: usize> Sensed<D> {
-    /// What a cone at `x` (µm) with unit heading `e` feels of all segments but those of the shaft `own`.
-    pub fn sense(&mut self, felt: &Felt, x: [f64; D], e: [f64; D], segments: &Segments<D>, own: u32) {
-        let (arch, n) = (self.arch, segments.len());
-        fit(&mut self.views, n);
-        arch.dispatch(Look { felt, x, e, segments, views: &mut self.views[..n] });
-        let whole = self.pick(segments, own);
-        let m = self.felt.len();
-        self.normal.iter_mut().chain(&mut self.moments).chain([&mut self.along]).for_each(|column| fit(column, m));
-        arch.dispatch(Integrate { felt, x, e, whole, sensed: self });
-    }
-
-    /// Everything that is felt, in an order that depends on nothing else.
-    #[inline]
-    pub fn touches(&self) -> impl Iterator<Item = Touch<D>> + '_ {
-        let m = self.felt.len();
-        let normal = self.normal.each_ref().map(|column| &column[..m]);
-        let tangent = self.felt.tangent.each_ref().map(|column| &column[..m]);
-        let [w0, w1] = self.moments.each_ref().map(|column| &column[..m]);
-        let (along, owner) = (&self.along[..m], &self.felt.owner[..m]);
-        (0..m).map(move |i| Touch {
-            normal: normal.map(|c| c[i]),
-            tangent: tangent.map(|c| c[i]),
-            moments: [w0[i], w1[i]],
-            along: along[i],
-            owner: owner[i],
-        })
-    }
-
-    /// Copies together what is felt; returns how many of it lie within the sector as a whole.
-    fn pick(&mut self, segments: &Segments<D>, own: u32) -> usize {
-        let views = &self.views[..segments.len()];
-        for (picked, view) in self.picked.iter_mut().zip([View::Whole, View::Part]) {
-            select(picked, views, view as u64);
-            picked.retain(|&i| segments.owner[i as usize] != own);
+impl<const D: usize> Contacts<D> {
+    /// The sum of a law over all segments but those of the shaft `own`, each times the adhesion to its shaft, as a cone at `x` (µm)
+    /// with unit heading `e` feels them.
+    pub fn sum(
+        &mut self,
+        (x, e): ([f64; D], [f64; D]),
+        segments: &Segments<D>,
+        own: u32,
+        (felt, law): (&Felt, &impl ContactPull<D>),
+        adhesion: impl Fn(u32) -> f64,
+    ) -> [f64; D] {
+        let n = segments.len();
+        if self.views.len() < n {
+            self.views.resize(n, View::Nothing as u64);
         }
-        let [whole, part] = &self.picked;
-        for k in 0..D {
-            copy(&mut self.felt.start[k], &segments.start[k], whole, part);
-            copy(&mut self.felt.tangent[k], &segments.tangent[k], whole, part);
+        self.arch.dispatch(Look { felt, x, e, segments, own, views: &mut self.views[..n] });
+        select(&mut self.picked, &self.views[..n]);
+        let Self { arch, picked: [whole, part], batch, .. } = self;
+        let mut sums = [[0.0; LANES]; D];
+        for picked in whole.chunks(BATCH) {
+            let count = batch.fill(segments, picked, &adhesion);
+            arch.dispatch(Integrate::<D, true, _> { felt, x, e, law, count, batch, sums: &mut sums });
         }
-        copy(&mut self.felt.length, &segments.length, whole, part);
-        copy(&mut self.felt.owner, &segments.owner, whole, part);
-        whole.len()
+        for picked in part.chunks(BATCH) {
+            let count = batch.fill(segments, picked, &adhesion);
+            arch.dispatch(Integrate::<D, false, _> { felt, x, e, law, count, batch, sums: &mut sums });
+        }
+        sums.map(|[a, b, c, d, e, f, g, h]| ((a + b) + (c + d)) + ((e + f) + (g + h)))
+    }
+}
+
+impl<const D: usize> Batch<D> {
+    /// Copies picked segments together; what fills up the last lanes is the last of them with no adhesion.
+    /// Returns the number of lanes in use.
+    fn fill(&mut self, segments: &Segments<D>, picked: &[u32], adhesion: &impl Fn(u32) -> f64) -> usize {
+        let last = picked.last().copied().unwrap_or(0);
+        let padded = picked.len().next_multiple_of(LANES);
+        let all = picked.iter().copied().chain(std::iter::repeat_n(last, padded - picked.len()));
+        for (to, from) in all.enumerate() {
+            let from = from as usize;
+            for k in 0..D {
+                self.start[k][to] = segments.start[k][from];
+                self.tangent[k][to] = segments.tangent[k][from];
+            }
+            self.length[to] = segments.length[from];
+            self.adhesion[to] = if to < picked.len() { adhesion(segments.owner[from]) } else { 0.0 };
+        }
+        padded
     }
 }
 
@@ -157,6 +173,7 @@ struct Look<'a, const D: usize> {
     x: [f64; D],
     e: [f64; D],
     segments: &'a Segments<D>,
+    own: u32,
     views: &'a mut [u64],
 }
 
@@ -168,49 +185,50 @@ impl<const D: usize> WithSimd for Look<'_, D> {
         let n = self.views.len();
         let start = self.segments.start.each_ref().map(|column| &column[..n]);
         let tangent = self.segments.tangent.each_ref().map(|column| &column[..n]);
-        let length = &self.segments.length[..n];
+        let (length, owner) = (&self.segments.length[..n], &self.segments.owner[..n]);
         for i in 0..n {
             let (sight, _) = look(start.map(|c| c[i]), tangent.map(|c| c[i]), length[i], self.x, self.e);
-            self.views[i] = self.felt.view(&sight) as u64;
+            let view = self.felt.view(&sight) as u64;
+            self.views[i] = if owner[i] == self.own { View::Nothing as u64 } else { view };
         }
     }
 }
 
-/// The second pass: what was picked is integrated, the first `whole` of it without a cut.
-struct Integrate<'a, const D: usize> {
+/// The second pass: a batch is integrated and added up; one that is not `WHOLE` is cut by the sector.
+struct Integrate<'a, const D: usize, const WHOLE: bool, L> {
     felt: &'a Felt,
     x: [f64; D],
     e: [f64; D],
-    whole: usize,
-    sensed: &'a mut Sensed<D>,
+    law: &'a L,
+    count: usize,
+    batch: &'a mut Batch<D>,
+    sums: &'a mut [[f64; LANES]; D],
 }
 
-impl<const D: usize> WithSimd for Integrate<'_, D> {
+impl<const D: usize, const WHOLE: bool, L: ContactPull<D>> WithSimd for Integrate<'_, D, WHOLE, L> {
     type Output = ();
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) {
-        let Sensed { felt: segments, normal, moments, along, .. } = self.sensed;
-        let (m, whole, felt) = (segments.len(), self.whole, self.felt);
-        let start = segments.start.each_ref().map(|column| &column[..m]);
-        let tangent = segments.tangent.each_ref().map(|column| &column[..m]);
-        let length = &segments.length[..m];
-        let normal = normal.each_mut().map(|column| &mut column[..m]);
-        let ([w0, w1], along) = (moments.each_mut().map(|column| &mut column[..m]), &mut along[..m]);
-        for i in 0..whole {
-            let (sight, n) = look(start.map(|c| c[i]), tangent.map(|c| c[i]), length[i], self.x, self.e);
-            [w0[i], w1[i]] = felt.moments_within_reach(&sight);
-            along[i] = sight.along;
+        let Self { felt, x, e, law, count, batch, sums } = self;
+        let start = batch.start.each_ref().map(|column| &column[..count]);
+        let tangent = batch.tangent.each_ref().map(|column| &column[..count]);
+        let (length, adhesion) = (&batch.length[..count], &batch.adhesion[..count]);
+        let pull = batch.pull.each_mut().map(|column| &mut column[..count]);
+        for i in 0..count {
+            let tangent = tangent.map(|c| c[i]);
+            let (sight, normal) = look(start.map(|c| c[i]), tangent, length[i], x, e);
+            let moments = if WHOLE { felt.moments_within_reach(&sight) } else { felt.moments_within_sector(&sight) };
+            let of_touch = law.pull(&Touch { normal, tangent, moments, along: sight.along });
             for k in 0..D {
-                normal[k][i] = n[k];
+                pull[k][i] = of_touch[k] * adhesion[i];
             }
         }
-        for i in whole..m {
-            let (sight, n) = look(start.map(|c| c[i]), tangent.map(|c| c[i]), length[i], self.x, self.e);
-            [w0[i], w1[i]] = felt.moments_within_sector(&sight);
-            along[i] = sight.along;
-            for k in 0..D {
-                normal[k][i] = n[k];
+        for (sums, pull) in sums.iter_mut().zip(pull) {
+            for lanes in pull.chunks_exact(LANES) {
+                for (sum, value) in sums.iter_mut().zip(lanes) {
+                    *sum += value;
+                }
             }
         }
     }
@@ -242,27 +260,78 @@ fn dot<const D: usize>(a: &[f64; D], b: &[f64; D]) -> f64 {
     sum
 }
 
-/// The places at which a column of marks has a value, ascending.
-fn select(places: &mut Vec<u32>, marks: &[u64], value: u64) {
-    places.clear();
-    places.resize(marks.len(), 0);
-    let mut count = 0;
-    for (i, &mark) in (0..).zip(marks) {
-        places[count] = i;
-        count += usize::from(mark == value);
+/// The places of what is seen whole and of what is seen in part, ascending.
+fn select([whole, part]: &mut [Vec<u32>; 2], views: &[u64]) {
+    for places in [&mut *whole, &mut *part] {
+        places.clear();
+        places.resize(views.len(), 0);
     }
-    places.truncate(count);
+    let mut count = [0; 2];
+    for (i, &view) in (0..).zip(views) {
+        whole[count[0]] = i;
+        part[count[1]] = i;
+        count[0] += usize::from(view == View::Whole as u64);
+        count[1] += usize::from(view == View::Part as u64);
+    }
+    whole.truncate(count[0]);
+    part.truncate(count[1]);
 }
 
-/// Replaces a column by two selections of another.
-fn copy<T: Copy>(to: &mut Vec<T>, from: &[T], first: &[u32], second: &[u32]) {
-    to.clear();
-    to.extend(first.iter().chain(second).map(|&i| from[i as usize]));
-}
+#[cfg(test)]
+mod tests {
+    use super::*;
 
-/// Makes room for n values.
-fn fit<T: Clone + Default>(column: &mut Vec<T>, n: usize) {
-    if column.len() < n {
-        column.resize(n, T::default());
+    /// W₀ n + W₁ t: pulls toward all that is felt.
+    struct Toward;
+
+    impl ContactPull<2> for Toward {
+        #[inline(always)]
+        fn pull(&self, touch: &Touch<2>) -> [f64; 2] {
+            std::array::from_fn(|k| touch.normal[k] * touch.moments[0] + touch.tangent[k] * touch.moments[1])
+        }
+    }
+
+    const FELT: Felt = Felt { reach: 10.0, cos_sector: -0.5 };
+
+    /// Segments of 40 shafts about the origin, with one far away after every `every`th.
+    fn around(count: u32, every: u32) -> Segments<2> {
+        let mut segments = Segments::default();
+        for i in 0..count {
+            let share = |k: u32| (f64::from(i) * 0.618_033_988_75 * f64::from(2 * k + 1)).fract();
+            let start = [16.0 * share(0) - 8.0, 16.0 * share(1) - 8.0];
+            segments.push(start, [start[0] + 6.0 * share(2) - 3.0, start[1] + 6.0 * share(3)], i % 40);
+            if i % every == 0 {
+                segments.push([50.0 + f64::from(i), 3.0], [60.0, 9.0], i % 40);
+            }
+        }
+        segments
+    }
+
+    fn sum(segments: &Segments<2>, adhesion: impl Fn(u32) -> f64) -> [f64; 2] {
+        Contacts::default().sum(([0.3, -0.2], [0.6, 0.8]), segments, 7, (&FELT, &Toward), adhesion)
+    }
+
+    #[test]
+    fn the_sum_over_many_is_the_sum_of_each_times_its_adhesion_without_the_own_shaft() {
+        let adhesion = |shaft: u32| f64::from(shaft) * 0.1 - 1.0;
+        let many = around(500, 1000);
+        let mut expected = [0.0; 2];
+        for i in 0..many.len() {
+            let mut one = Segments::default();
+            let start = many.start.each_ref().map(|c| c[i]);
+            one.push(start, std::array::from_fn(|k| start[k] + many.length[i] * many.tangent[k][i]), many.owner[i]);
+            let pull = if many.owner[i] == 7 { [0.0; 2] } else { sum(&one, adhesion) };
+            expected = [expected[0] + pull[0], expected[1] + pull[1]];
+        }
+        let found = sum(&many, adhesion);
+        assert!(expected[0].hypot(expected[1]) > 10.0);
+        assert!((found[0] - expected[0]).hypot(found[1] - expected[1]) < 1e-11, "{found:?} {expected:?}");
+    }
+
+    #[test]
+    fn what_is_not_felt_changes_no_bit() {
+        for (count, every) in [(1, 1), (63, 2), (64, 7), (65, 1), (500, 3)] {
+            assert_eq!(sum(&around(count, every), |_| 1.0), sum(&around(count, 1000), |_| 1.0), "{count} {every}");
+        }
     }
 }

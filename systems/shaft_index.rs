@@ -13,10 +13,10 @@
 
 use crate::model::shafts::BLOCK;
 use crate::numerics::locate::MaterialPoint;
+use crate::numerics::polylines::{Part, Polyline, meeting};
 use crate::numerics::segments::Segments;
 use crate::prelude::*;
 use nalgebra::Vector2;
-use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 use rstar::primitives::GeomWithData;
 use rstar::{AABB, RTree};
@@ -25,8 +25,6 @@ use std::sync::{Mutex, PoisonError};
 
 type Entry = GeomWithData<[f64; 2], VertexId>;
 type Square = [i32; 2];
-/// A block of vertices, and a bit for each of them that is meant.
-type Part = (u32, u16);
 const _: () = assert!(BLOCK == u16::BITS as usize);
 
 /// Side of a square over the reach.
@@ -93,43 +91,13 @@ pub struct ShaftIndex {
     places: Places,
 }
 
-/// Positions now (µm) of a block's vertices, and of the point that the last of them leads to, coordinate by coordinate.
-type Polyline = [[f64; BLOCK + 1]; 2];
-
-/// Which of the listed segments have a bounding box that meets the one from `low` to `high`: the list's bits, less. Compiled once
-/// for each register width.
-struct Meet<'a> {
-    positions: &'a [Polyline],
-    list: &'a [Part],
-    box_: [Vector2<f64>; 2],
-    met: &'a mut Vec<Part>,
-}
-
-impl WithSimd for Meet<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn with_simd<S: Simd>(self, _: S) {
-        let [low, high] = self.box_;
-        let meets = |line: &[f64; BLOCK + 1], i: usize, low: f64, high: f64| {
-            (line[i].max(line[i + 1]) >= low) & (line[i].min(line[i + 1]) <= high)
-        };
-        self.met.clear();
-        for &(block, vertices) in self.list {
-            let [x, y] = &self.positions[block as usize];
-            let near = |i: usize| meets(x, i, low.x, high.x) & meets(y, i, low.y, high.y);
-            let bits = (0..BLOCK).fold(0, |bits, i| bits | (u16::from(near(i)) << i)) & vertices;
-            if bits != 0 {
-                self.met.push((block, bits));
-            }
-        }
-    }
-}
+/// Positions now (µm) of a block's vertices, and of the point that the last of them leads to.
+type Line = Polyline<{ BLOCK + 1 }>;
 
 /// Polylines of the blocks that some list names, each found once for all squares.
 #[derive(Debug, Default)]
 struct Places {
-    positions: Vec<Polyline>,
+    positions: Vec<Line>,
     /// For each block, one more than the revision of the configuration it was found in; 0 when not yet, or when it still grows.
     revisions: Vec<u64>,
     stale: Vec<bool>,
@@ -188,14 +156,13 @@ impl ShaftIndex {
         self.prepare(scene, &order);
         let groups: Vec<&[(Square, u32)]> = order.chunk_by(|a, b| a.0 == b.0).collect();
         let (columns, workplaces) = (Pool::<(Segments<2>, Vec<Part>)>::default(), Pool::<S>::default());
-        let arch = Arch::new();
         let serve = |segments: &Segments<2>, part: &[(Square, u32)]| -> Vec<(u32, T)> {
             let each = |work: &mut S| part.iter().map(|&(_, i)| (i, act(work, &cones[i as usize], segments))).collect();
             workplaces.lend(each)
         };
         let serve_group = |group: &&[(Square, u32)]| -> Vec<(u32, T)> {
             columns.lend(|columns| {
-                self.gather((scene, arch), group, cones, columns);
+                self.gather(scene, group, cones, columns);
                 let segments = &columns.0;
                 group.par_chunks(SHARED).with_max_len(1).map(|part| serve(segments, part)).flatten_iter().collect()
             })
@@ -238,7 +205,7 @@ impl ShaftIndex {
     /// The segments of a square's list that come near any cone of a group.
     fn gather(
         &self,
-        (scene, arch): (&ShaftScene, Arch),
+        scene: &ShaftScene,
         group: &[(Square, u32)],
         cones: &[Asking],
         columns: &mut (Segments<2>, Vec<Part>),
@@ -252,7 +219,7 @@ impl ShaftIndex {
         let near = match self.search {
             Search::All => list,
             Search::Tree => {
-                arch.dispatch(Meet { positions: &self.places.positions, list, box_: [low, high], met });
+                meeting(&self.places.positions, list, [low, high], met);
                 &*met
             }
         };
@@ -331,7 +298,7 @@ impl ShaftScene<'_> {
     }
 
     /// Positions now (µm) of a block's vertices and of the point after them; zeros for vertices not yet stored.
-    fn polyline(&self, block: u32) -> Polyline {
+    fn polyline(&self, block: u32) -> Line {
         let mut positions = [[0.0; BLOCK + 1]; 2];
         let vertices = self.shafts.block_vertices(block);
         let after = match self.shafts.block_after(block) {

@@ -18,6 +18,7 @@ pub mod material;
 pub mod newton;
 pub mod planar_domain;
 pub mod polygon;
+pub mod polylines;
 mod quadratic_element;
 pub mod quadratic_field;
 pub mod quadrature;

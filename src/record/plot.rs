@@ -40,8 +40,8 @@ pub struct Series {
 
 impl Series {
     /// A series without whiskers.
-    pub fn new(name: impl Into<String>, points: Vec<[f64; 2]>, stroke: Stroke) -> Self {
-        Self { name: name.into(), points, whiskers: Vec::new(), stroke }
+    pub fn new(name: impl Into<String>, points: impl IntoIterator<Item = [f64; 2]>, stroke: Stroke) -> Self {
+        Self { name: name.into(), points: points.into_iter().collect(), whiskers: Vec::new(), stroke }
     }
 }
 

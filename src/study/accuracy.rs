@@ -21,13 +21,13 @@
 //! the choice is the same everywhere. The tolerance of the load path is ε/1000. Keys that the scene gives itself are
 //! kept. Ours: all of this.
 
-use super::laboratory::{Laboratory, cones, run_until};
+use super::laboratory::{Laboratory, cones, few_axons, run_until};
 use super::run::{RunError, read};
 use crate::model::health::Counters;
 use crate::model::mechanism::Roster;
 use crate::model::plan::Plan;
 use crate::model::tissue::{Configuration, Tissue};
-use crate::model::violation::{Violation, pointer_token};
+use crate::model::violation::Violation;
 use crate::scenario::load::{Loaded, Request, ScenarioErrors};
 use nalgebra::Vector3;
 use serde::Serialize;
@@ -88,6 +88,9 @@ pub struct Found {
 pub fn settled(request: &Request, roster: &Roster) -> Result<(Request, Loaded), RunError> {
     let mut loaded = read(request, roster)?;
     let mut request = request.clone();
+    if loaded.scene.accuracy.is_none() {
+        return Ok((request, loaded));
+    }
     if let Some(found) = find(&Laboratory::new(&request, roster))? {
         let hints = std::mem::take(&mut loaded.hints);
         request.set.extend(found.set.iter().cloned());
@@ -336,9 +339,7 @@ impl Search<'_> {
         self.pilots += 1;
         let without: Vec<&str> = CHAOTIC.into_iter().filter(|name| self.scene.blocks.contains_key(*name)).collect();
         let mut set = self.keys();
-        for (name, _) in self.scene.scene.populations.iter().filter(|(_, population)| population.count > PILOT_AXONS) {
-            set.push(format!("/populations{}/count={PILOT_AXONS}", pointer_token(name)));
-        }
+        set.extend(few_axons(self.scene, PILOT_AXONS));
         let mut simulation = self.laboratory.assemble(&self.laboratory.load(&without, &set)?)?;
         run_until(&mut simulation, self.scene.scene.time.duration.0)?;
         let world = simulation.world();

@@ -6,6 +6,7 @@ use crate::model::components::{GrowthCone, Journey, Site, SpringState};
 use crate::model::mechanism::Roster;
 use crate::model::stopwatch::Stopwatch;
 use crate::model::tissue::{Configuration, Tissue};
+use crate::model::violation::pointer_token;
 use crate::scenario::load::{Loaded, Request};
 use crate::simulation::Simulation;
 use bevy_ecs::prelude::With;
@@ -168,6 +169,12 @@ pub fn cones(simulation: &Simulation) -> Vec<ConeView> {
         length: journey.length,
     };
     query.map(|mut query| query.iter(world).map(view).collect()).unwrap_or_default()
+}
+
+/// The keys, as `--set` takes them, that leave each population `most` axons at most.
+pub fn few_axons(scene: &Loaded, most: u64) -> Vec<String> {
+    let larger = scene.scene.populations.iter().filter(|(_, population)| population.count > most);
+    larger.map(|(name, _)| format!("/populations{}/count={most}", pointer_token(name))).collect()
 }
 
 /// The angle between two vectors, in degrees; 0 if one of them is none.

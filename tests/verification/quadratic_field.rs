@@ -1,11 +1,12 @@
 //! Eq. (2) in quadratic elements: orders, closed form, independent reference, budget, rate.
 
+use crate::reaction_diffusion::radial_mesh;
 use std::f64::consts::{PI, TAU};
 
 use serde_json::Value;
 use tropism::numerics::element_gradient::{MovingField, averaged_gradients, corner_gradients, linear_gradients};
 use tropism::numerics::locate::{MaterialPoint, SeedGrid};
-use tropism::numerics::planar_domain::{Outline, PlanarDomain, Ring};
+use tropism::numerics::planar_domain::{Outline, PlanarDomain};
 use tropism::numerics::quadratic_field::{QuadraticNodes, QuadraticSolver};
 use tropism::numerics::quadrature::simplex_rule;
 use tropism::numerics::reaction_diffusion::{Mass, ReactionDiffusion, ReactionDiffusionError, Source};
@@ -114,13 +115,6 @@ fn quadratic_values_converge_with_order_three_and_gradients_with_order_two() {
 }
 
 /// A disc domain of radius 1 about the origin with a fitted disc source of radius 0.3.
-fn radial_mesh(size: f64) -> FittedMesh {
-    let points = Outline::disc([0.0, 0.0], 1.0, size).points;
-    let outer = Ring { edges: vec![0; points.len()], points };
-    let domain = PlanarDomain::new(outer, Vec::new(), vec!["rim".into()]);
-    triangulate(&domain, &[Outline::disc([0.0, 0.0], 0.3, size)], &MeshOptions::of_size(size)).unwrap()
-}
-
 #[test]
 fn a_disc_source_in_a_disc_converges_to_the_bessel_solution_in_quadratic_elements() {
     let radial = &reference("convergence")["radial"];

@@ -108,7 +108,7 @@ fn values_converge_with_order_two_and_gradients_with_order_one() {
 }
 
 /// A disc domain of radius 1 about the origin with a fitted disc source of radius 0.3.
-fn radial_mesh(size: f64) -> FittedMesh {
+pub(crate) fn radial_mesh(size: f64) -> FittedMesh {
     let points = Outline::disc([0.0, 0.0], 1.0, size).points;
     let outer = Ring { edges: vec![0; points.len()], points };
     let domain = PlanarDomain::new(outer, Vec::new(), vec!["rim".into()]);

@@ -2,7 +2,9 @@
 
 use super::work_precision::{ErrorKind, Factor, short};
 use crate::scenario::load::Loaded;
-use crate::study::laboratory::{ConeView, Laboratory, Setting, angle_between, cones, root_mean_square, run_until};
+use crate::study::laboratory::{
+    ConeView, Laboratory, Setting, angle_between, cones, few_axons, root_mean_square, run_until,
+};
 use crate::study::run::RunError;
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -122,15 +124,8 @@ fn adaptive(scene: &Loaded, tolerance: f64) -> Setting {
     }
 }
 
-/// Keys that leave each population at most [`MOST_AXONS`].
-fn few(scene: &Loaded) -> Vec<String> {
-    let populations = scene.scene.populations.iter().filter(|(_, population)| population.count > MOST_AXONS);
-    let pointer = |name: &str| crate::model::violation::pointer_token(name);
-    populations.map(|(name, _)| format!("/populations{}/count={MOST_AXONS}", pointer(name))).collect()
-}
-
 fn measure(laboratory: &Laboratory, scene: &Loaded, case: &Case, tick: &dyn Fn(f64)) -> Result<Factor, RunError> {
-    let few = few(scene);
+    let few = few_axons(scene, MOST_AXONS);
     let load = |set: &[String]| laboratory.load(&case.without, &[&few, set].concat());
     let finest = |power: i32| {
         let mut simulation = laboratory.assemble(&load(&fixed(scene, case.exact, power).set)?)?;

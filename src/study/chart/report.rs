@@ -95,7 +95,7 @@ fn plots(factor: &Factor) -> Vec<Plot> {
     }
     let of = |error: &ErrorKind| {
         let value = |point: &Point| point.errors.get(&error.name).copied().unwrap_or(f64::NAN);
-        let front = factor.front(error).iter().map(|point| [value(point), point.seconds.median]).collect();
+        let front = factor.front(error).into_iter().map(|point| [value(point), point.seconds.median]);
         let front = Series::new("Pareto front", front, Stroke::Underlay);
         let floor = (error.floor > 0.0).then(|| Level { name: "floor".into(), at: error.floor, vertical: true });
         let levels = error.levels.iter().map(|(name, at)| Level { name: name.clone(), at: *at, vertical: true });
@@ -114,7 +114,7 @@ fn plot(factor: &Factor, label: &str, value: &dyn Fn(&Point) -> f64, further: Ve
             whiskers: of_method.iter().map(|point| [point.seconds.low, point.seconds.high]).collect(),
             ..Series::new(
                 method,
-                of_method.iter().map(|point| [value(point), point.seconds.median]).collect(),
+                of_method.iter().map(|point| [value(point), point.seconds.median]),
                 Stroke::LineAndMarks,
             )
         }

@@ -2,6 +2,7 @@
 //! seed changes.
 
 use super::work_precision::{ErrorKind, Factor, Point, Seconds, short, time};
+use crate::record::statistics;
 use crate::record::summary::Summary;
 use crate::scenario::load::Loaded;
 use crate::study::laboratory::{Laboratory, Setting};
@@ -42,7 +43,7 @@ pub fn chart(laboratory: &Laboratory, tick: &dyn Fn(f64)) -> Result<Factor, RunE
     }
     let kind = |(k, (name, label)): (usize, &(&str, &str))| {
         let values: Vec<f64> = reference.iter().filter_map(|run| run[k]).collect();
-        let spread = standard_deviation(&values);
+        let spread = statistics::standard_deviation(&values).unwrap_or(0.0);
         let of_mean = 1.96 * spread / (values.len().max(1) as f64).sqrt();
         let levels = [("seed to seed (SD)".to_owned(), spread), ("95 % of the mean".to_owned(), of_mean)];
         ErrorKind { name: (*name).to_owned(), label: (*label).to_owned(), floor: 0.0, levels: levels.into() }
@@ -108,15 +109,9 @@ fn measures(summary: &Summary) -> Measures {
 fn changes(found: &[Measures], reference: &[Measures]) -> BTreeMap<String, f64> {
     let change = |k: usize| {
         let pairs: Vec<f64> = found.iter().zip(reference).filter_map(|(a, b)| Some(a[k]? - b[k]?)).collect();
-        (pairs.iter().sum::<f64>() / pairs.len().max(1) as f64).abs()
+        statistics::mean(&pairs).unwrap_or(0.0).abs()
     };
     KINDS.iter().enumerate().map(|(k, (name, _))| ((*name).to_owned(), change(k))).collect()
-}
-
-fn standard_deviation(values: &[f64]) -> f64 {
-    let n = values.len() as f64;
-    let mean = values.iter().sum::<f64>() / n.max(1.0);
-    (values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / (n - 1.0).max(1.0)).sqrt()
 }
 
 /// The fastest setting whose changes all lie below what the seeds leave undecided.

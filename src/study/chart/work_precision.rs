@@ -1,5 +1,6 @@
 //! Error against time: what was measured of one choice, what it costs to be right, and which settings are worth their time.
 
+use crate::record::statistics::Distribution;
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -17,12 +18,8 @@ pub struct Seconds {
 impl Seconds {
     /// Of at least one measurement; none without.
     pub fn of(measured: &[f64]) -> Option<Self> {
-        let mut sorted = measured.to_vec();
-        sorted.sort_by(f64::total_cmp);
-        let (low, high) = (*sorted.first()?, *sorted.last()?);
-        let middle = sorted.len() / 2;
-        let median = if sorted.len() % 2 == 1 { sorted[middle] } else { 0.5 * (sorted[middle - 1] + sorted[middle]) };
-        Some(Self { median, low, high })
+        let Distribution { median, min, max, .. } = Distribution::of(measured)?;
+        Some(Self { median, low: min, high: max })
     }
 }
 

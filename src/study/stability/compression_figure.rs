@@ -1,8 +1,8 @@
 //! The figure of the matrix in compression.
 
+use super::Figure;
 use super::compression::{Case, CompressionMap, Law, Sides};
-use super::{Figure, axis, series};
-use crate::record::plot::{Axis, Level, Mark, Plot, Stroke};
+use crate::record::plot::{Axis, Level, Mark, Plot, Series, Stroke};
 
 fn name(Case { law, poisson, sides }: Case) -> String {
     let sides = if sides == Sides::Free { "free" } else { "confined" };
@@ -17,7 +17,7 @@ fn stroke(sides: Sides) -> Stroke {
 impl CompressionMap {
     /// Ellipticity, force and Newton's iterations over the stretch, with the first negative eigenvalues.
     pub fn figure(&self) -> Figure {
-        let x = || Axis { label: "stretch of the block".into(), logarithmic: false, range: Some([0.5, 1.0]) };
+        let x = || Axis { range: Some([0.5, 1.0]), ..Axis::linear("stretch of the block") };
         let plot = |title: &str, y, series, levels, marks, note: &str| Plot {
             title: title.into(),
             x: x(),
@@ -30,7 +30,7 @@ impl CompressionMap {
         let shown = |law, poisson| law == Law::StVenantKirchhoff || poisson == 0.3;
         let ellipticity = self.ellipticity.iter().filter(|map| shown(map.law, map.poisson)).map(|map| {
             let case = Case { law: map.law, poisson: map.poisson, sides: map.sides };
-            series(name(case), stroke(map.sides), map.curve.iter().copied())
+            Series::new(name(case), map.curve.iter().copied(), stroke(map.sides))
         });
         let lost = self.ellipticity.iter().filter_map(|map| {
             let at = map.lost_at?;
@@ -38,11 +38,11 @@ impl CompressionMap {
         });
         let force = self.force.iter().map(|map| {
             let case = Case { law: Law::StVenantKirchhoff, poisson: map.poisson, sides: map.sides };
-            series(name(case), stroke(map.sides), map.curve.iter().copied())
+            Series::new(name(case), map.curve.iter().copied(), stroke(map.sides))
         });
         let newton = self.newton.iter().filter(|map| map.poisson == 0.3 && !map.clamped).map(|map| {
             let case = Case { law: map.law, poisson: map.poisson, sides: map.sides };
-            series(name(case), Stroke::LineAndMarks, map.iterations.iter().copied())
+            Series::new(name(case), map.iterations.iter().copied(), Stroke::LineAndMarks)
         });
         let finest = self.inertia.iter().map(|map| map.rows).max();
         let buckling = self
@@ -62,7 +62,7 @@ impl CompressionMap {
             plots: vec![
                 plot(
                     "ellipticity",
-                    Axis { range: Some([-0.5, 1.0]), ..axis("smallest acoustic eigenvalue over E", false) },
+                    Axis { range: Some([-0.5, 1.0]), ..Axis::linear("smallest acoustic eigenvalue over E") },
                     ellipticity.collect(),
                     vec![zero],
                     lost.collect(),
@@ -70,7 +70,7 @@ impl CompressionMap {
                 ),
                 plot(
                     "force",
-                    axis("compressive force over E and width", false),
+                    Axis::linear("compressive force over E and width"),
                     force.collect(),
                     vec![root],
                     Vec::new(),
@@ -78,7 +78,7 @@ impl CompressionMap {
                 ),
                 plot(
                     "Newton's method, ν = 0.3",
-                    Axis { range: Some([0.0, 12.0]), ..axis("iterations a level of 2.5 %", false) },
+                    Axis { range: Some([0.0, 12.0]), ..Axis::linear("iterations a level of 2.5 %") },
                     newton.collect(),
                     buckling.collect(),
                     Vec::new(),

@@ -9,10 +9,10 @@
 //! All lattices have edges of length h along their rows; "obtuse" has the vertices of the equilateral one and the other diagonals
 //! (120°, 30°, 30°), once as meshed and once as the solver treats it, which flips edges.
 
-use super::{Figure, axis, logarithmic, series, unsolved};
+use super::{Figure, logarithmic, unsolved};
 use crate::numerics::reaction_diffusion::{Mass, ReactionDiffusion, Source, StationarySolver};
 use crate::numerics::simplex_mesh::{SimplexMesh, structured_rectangle};
-use crate::record::plot::{Axis, Level, Plot, Stroke};
+use crate::record::plot::{Axis, Level, Plot, Series, Stroke};
 use crate::study::run::RunError;
 use rayon::prelude::*;
 use serde::Serialize;
@@ -175,15 +175,15 @@ impl CueMeshMap {
     pub fn figure(&self) -> Figure {
         let plot = |title: &str, label: &str, of: &dyn Fn(&CuePoint) -> f64, levels, note: &str| Plot {
             title: title.into(),
-            x: axis("k h²/D", true),
-            y: Axis { label: label.into(), logarithmic: false, range: None },
+            x: Axis::logarithmic("k h²/D"),
+            y: Axis::linear(label),
             series: self
                 .series
                 .iter()
                 .map(|map| {
                     let stroke = if map.mass == "lumped" { Stroke::Dashed } else { Stroke::Line };
                     let points = map.points.iter().map(|point| [point.stiffness, of(point)]);
-                    series(format!("{}, {}", map.mesh, map.mass), stroke, points)
+                    Series::new(format!("{}, {}", map.mesh, map.mass), points, stroke)
                 })
                 .collect(),
             levels,

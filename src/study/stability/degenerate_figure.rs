@@ -1,7 +1,7 @@
 //! The figure of the degenerate scenes.
 
+use super::Figure;
 use super::degenerate::{DegenerateMap, End, Outcome};
-use super::{Figure, axis, series};
 use crate::record::plot::{Axis, Plot, Series, Stroke};
 
 impl DegenerateMap {
@@ -9,7 +9,7 @@ impl DegenerateMap {
     pub fn figure(&self) -> Figure {
         let lines = |names: &[&str], stroke: Stroke, of: &dyn Fn(&Outcome) -> Vec<[f64; 2]>| -> Vec<Series> {
             let shown = names.iter().filter_map(|name| self.scene(name));
-            shown.map(|outcome| series(words(outcome.name), stroke, of(outcome))).collect()
+            shown.map(|outcome| Series::new(words(outcome.name), of(outcome), stroke)).collect()
         };
         let plot = |title: &str, x: Axis, y: Axis, series, note: String| Plot {
             title: title.into(),
@@ -40,8 +40,8 @@ impl DegenerateMap {
             plots: vec![
                 plot(
                     "at the border",
-                    Axis { range: Some([175.0, 205.0]), ..axis("x (µm)", false) },
-                    Axis { range: Some([125.0, 155.0]), ..axis("y (µm)", false) },
+                    Axis { range: Some([175.0, 205.0]), ..Axis::linear("x (µm)") },
+                    Axis { range: Some([125.0, 155.0]), ..Axis::linear("y (µm)") },
                     lines(
                         &["corner_slide", "corner_leave", "endless_step_slide", "endless_step_stall"],
                         Stroke::LineAndMarks,
@@ -51,8 +51,8 @@ impl DegenerateMap {
                 ),
                 plot(
                     "without a gradient",
-                    axis("t (h)", false),
-                    axis("distance from the start (µm)", false),
+                    Axis::linear("t (h)"),
+                    Axis::linear("distance from the start (µm)"),
                     lines(
                         &["source_maximum", "source_maximum_noise", "zero_gradient", "facing_away"],
                         Stroke::Line,
@@ -63,8 +63,8 @@ impl DegenerateMap {
                 ),
                 plot(
                     "two shafts in one place",
-                    axis("t (h)", false),
-                    Axis { range: Some([0.0, 1.0]), ..axis("distance of the second from the first (µm)", false) },
+                    Axis::linear("t (h)"),
+                    Axis { range: Some([0.0, 1.0]), ..Axis::linear("distance of the second from the first (µm)") },
                     lines(&["coincident_together", "coincident_later"], Stroke::Line, &Outcome::gap),
                     "attraction vanishes at contact: round-off does not part them".into(),
                 ),

@@ -22,7 +22,7 @@ pub mod turning;
 
 use super::run::{RunError, write_json, write_picture};
 use crate::model::mechanism::Roster;
-use crate::record::plot::{Axis, Plot, Series, Stroke, draw};
+use crate::record::plot::{Plot, draw};
 use serde::Serialize;
 use std::path::Path;
 
@@ -107,16 +107,6 @@ impl Stability {
         }
         Ok(())
     }
-}
-
-/// An axis fitted to its data.
-fn axis(label: &str, logarithmic: bool) -> Axis {
-    Axis { label: label.into(), logarithmic, range: None }
-}
-
-/// A series without whiskers.
-fn series(name: impl Into<String>, stroke: Stroke, points: impl IntoIterator<Item = [f64; 2]>) -> Series {
-    Series { name: name.into(), points: points.into_iter().collect(), whiskers: Vec::new(), stroke }
 }
 
 /// `count` ≥ 2 values from the first of `ends` to the last, evenly spread in the logarithm.

@@ -5,10 +5,11 @@
 //! ⟨x²⟩ = 2 v² (r t − 1 + e^(−r t))/r², r = v/ℓ_p; under a unit pull the heading becomes von Mises, ⟨cos β⟩ = I₁(a)/I₀(a),
 //! a = κ ℓ_p/v.
 
-use super::{Figure, axis, series};
+use super::Figure;
 use crate::model::components::{GrowthCone, Position, SpringState};
 use crate::model::mechanism::Roster;
 use crate::record::plot::{Axis, Level, Plot, Series, Stroke};
+use crate::record::statistics;
 use crate::study::run::{RunError, assembled, read_document};
 use bevy_ecs::prelude::With;
 use rayon::prelude::*;
@@ -139,10 +140,8 @@ fn tips(roster: &Roster, method: &str, step: f64, axons: usize, pull: f64) -> Re
 
 fn mean(values: impl Iterator<Item = f64>) -> Mean {
     let values: Vec<f64> = values.collect();
-    let n = values.len() as f64;
-    let mean = values.iter().sum::<f64>() / n;
-    let variance = values.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / (n - 1.0).max(1.0);
-    Mean { mean, error: (variance / n).sqrt() }
+    let deviation = statistics::standard_deviation(&values).unwrap_or(0.0);
+    Mean { mean: statistics::mean(&values).unwrap_or(f64::NAN), error: deviation / (values.len() as f64).sqrt() }
 }
 
 fn distance(a: &[Tip], b: &[Tip]) -> f64 {
@@ -170,24 +169,24 @@ impl NoiseMap {
                 let points = map.points.iter().map(|point| [point.step, of(point).mean]);
                 let whisker = |mean: Mean| [mean.mean - 2.0 * mean.error, mean.mean + 2.0 * mean.error];
                 let whiskers = map.points.iter().map(|point| whisker(of(point))).collect();
-                Series { whiskers, ..series(map.method, Stroke::LineAndMarks, points) }
+                Series { whiskers, ..Series::new(map.method, points, Stroke::LineAndMarks) }
             };
             self.methods.iter().map(one).collect()
         };
         let apart = |map: &NoiseOfMethod| {
             let points = map.points.iter().filter_map(|point| Some([point.step, point.apart?]));
-            series(map.method, Stroke::LineAndMarks, points)
+            Series::new(map.method, points, Stroke::LineAndMarks)
         };
         let plot = |title: &str, y: Axis, series, levels, note: &str| Plot {
             title: title.into(),
-            x: axis("Δt (h)", true),
+            x: Axis::logarithmic("Δt (h)"),
             y,
             series,
             levels,
             marks: Vec::new(),
             note: note.into(),
         };
-        let cosine = |label: &str| Axis { range: Some([0.0, 1.0]), ..axis(label, false) };
+        let cosine = |label: &str| Axis { range: Some([0.0, 1.0]), ..Axis::linear(label) };
         Figure {
             name: "noise",
             title: "One Brownian path at every step",
@@ -195,7 +194,7 @@ impl NoiseMap {
             plots: vec![
                 plot(
                     "the same axon",
-                    axis("distance between tips at Δt and Δt/2 (µm, rms)", true),
+                    Axis::logarithmic("distance between tips at Δt and Δt/2 (µm, rms)"),
                     self.methods.iter().map(apart).collect(),
                     Vec::new(),
                     "under a unit pull",

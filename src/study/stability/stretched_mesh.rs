@@ -5,12 +5,12 @@
 //! grow tall and stay acute but for those around sources; pulled sideways they grow flat. Where the angles facing an edge come to more than 180° the lumped matrix loses the sign that keeps
 //! c ≥ 0. Remedy: edges are flipped for the diffusion matrix, vertices stay; edges of source outlines are not flipped.
 
-use super::{Figure, axis, series, unsolved};
+use super::{Figure, unsolved};
 use crate::numerics::delaunay::{Triangles, region_labels};
 use crate::numerics::planar_domain::{Outline, PlanarDomain};
 use crate::numerics::reaction_diffusion::{Mass, ReactionDiffusion, Source, StationarySolver};
 use crate::numerics::triangulate::{FittedMesh, MeshOptions, smallest_angle, triangulate};
-use crate::record::plot::{Level, Plot, Stroke};
+use crate::record::plot::{Axis, Level, Plot, Series, Stroke};
 use crate::study::run::RunError;
 use rayon::prelude::*;
 use serde::Serialize;
@@ -113,7 +113,7 @@ impl StretchMap {
     pub fn figure(&self) -> Figure {
         let over = |of: &dyn Fn(&StretchPoint) -> [f64; 2]| {
             let line = |name: &str, stroke, points: &[StretchPoint], which: usize| {
-                series(name, stroke, points.iter().map(|point| [point.stretch, of(point)[which]]))
+                Series::new(name, points.iter().map(|point| [point.stretch, of(point)[which]]), stroke)
             };
             vec![
                 line("upward, as meshed", Stroke::LineAndMarks, &self.upward, 0),
@@ -125,8 +125,8 @@ impl StretchMap {
         let paper = || vec![Level { name: "20 % a side".into(), at: 1.4, vertical: true }];
         let plot = |title: &str, label: &str, series, note: &str| Plot {
             title: title.into(),
-            x: axis("stretch λ", false),
-            y: axis(label, false),
+            x: Axis::linear("stretch λ"),
+            y: Axis::linear(label),
             series,
             levels: paper(),
             marks: Vec::new(),

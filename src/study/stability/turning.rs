@@ -8,11 +8,11 @@
 //!
 //! Every figure comes from the integrators that runs use, in a scene of one cone.
 
-use super::{Figure, axis, series};
+use super::Figure;
 use crate::model::components::{GrowthCone, SpringState};
 use crate::model::health::Health;
 use crate::model::mechanism::Roster;
-use crate::record::plot::{Level, Plot, Stroke};
+use crate::record::plot::{Axis, Level, Plot, Series, Stroke};
 use crate::simulation::Simulation;
 use crate::study::run::{RunError, assembled, read_document};
 use bevy_ecs::prelude::With;
@@ -156,7 +156,7 @@ impl TurningMap {
         let over = |y: &dyn Fn(&TurningPoint) -> f64| {
             let line = |map: &MethodMap| {
                 let stroke = if map.method == "rotation" { Stroke::Dashed } else { Stroke::Line };
-                series(map.method, stroke, map.points.iter().map(|point| [point.rate_times_step, y(point)]))
+                Series::new(map.method, map.points.iter().map(|point| [point.rate_times_step, y(point)]), stroke)
             };
             self.methods.iter().map(line).collect::<Vec<_>>()
         };
@@ -167,8 +167,8 @@ impl TurningMap {
         };
         let plot = |title: &str, label: &str, logarithmic, range, series, note: &str| Plot {
             title: title.into(),
-            x: axis("κΔt", true),
-            y: crate::record::plot::Axis { label: label.into(), logarithmic, range },
+            x: Axis::logarithmic("κΔt"),
+            y: Axis { label: label.into(), logarithmic, range },
             series,
             levels: limits(),
             marks: Vec::new(),

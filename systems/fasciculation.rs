@@ -161,7 +161,6 @@ fn attract(
     table: Res<AdhesionTable>,
     mut index: ResMut<ShaftIndex>,
     scene: ShaftScene,
-    axons: Res<ShaftPopulations>,
     mut counters: ResMut<Counters>,
     mut cones: Cones,
 ) {
@@ -176,8 +175,7 @@ fn attract(
     counters.neighbour_queries += asking.len() as u64;
     let pulls = index.for_each(&scene, &asking, |contacts: &mut Contacts<2>, cone, segments| {
         let state = (cone.position.xy().into(), cone.heading.xy().into());
-        let row = table.row(cone.population);
-        let adhesion = |shaft: u32| row[axons.0[shaft as usize] as usize];
+        let adhesion = table.row(cone.population);
         let [x, y] = contacts.sum(state, segments, cone.index, (&contact.felt, &contact), adhesion);
         let sum = Vector3::new(x, y, 0.0);
         sum / sum.norm().max(1.0)
@@ -197,8 +195,8 @@ mod tests {
     /// The pull of the segment from `a` to `b`, relative to the cone.
     fn pull(law: &ContactLaw, a: Vector3<f64>, b: Vector3<f64>, e: Vector3<f64>) -> Vector3<f64> {
         let (mut segments, mut contacts) = (Segments::default(), Contacts::<3>::default());
-        segments.push(a.into(), b.into(), 0);
-        contacts.sum(([0.0; 3], e.into()), &segments, 1, (&law.felt, law), |_| 1.0).into()
+        segments.push(a.into(), b.into(), (0, 0));
+        contacts.sum(([0.0; 3], e.into()), &segments, 1, (&law.felt, law), &[1.0]).into()
     }
 
     /// The integral by brute force: many midpoints, the sector tested point by point.

@@ -225,10 +225,11 @@ impl ShaftIndex {
         };
         for &(block, vertices) in near {
             let ([x, y], owner) = (&self.places.positions[block as usize], scene.shafts.block_owner(block));
+            let kind = u32::from(scene.populations.0[owner as usize]);
             let mut rest = vertices;
             while rest != 0 {
                 let i = rest.trailing_zeros() as usize;
-                segments.push([x[i], y[i]], [x[i + 1], y[i + 1]], owner);
+                segments.push([x[i], y[i]], [x[i + 1], y[i + 1]], (owner, kind));
                 rest &= rest - 1;
             }
         }
@@ -284,6 +285,8 @@ pub struct ShaftScene<'w> {
     pub configuration: Res<'w, Configuration>,
     /// The shafts.
     pub shafts: Res<'w, Shafts>,
+    /// The population of each of them: the kind by which they adhere.
+    pub populations: Res<'w, ShaftPopulations>,
 }
 
 impl ShaftScene<'_> {

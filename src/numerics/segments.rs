@@ -15,6 +15,7 @@ pub struct Segments<const D: usize> {
     tangent: [Vec<f64>; D],
     length: Vec<f64>,
     owner: Vec<u32>,
+    kind: Vec<u32>,
 }
 
 impl<const D: usize> Default for Segments<D> {
@@ -24,6 +25,7 @@ impl<const D: usize> Default for Segments<D> {
             tangent: [(); D].map(|()| Vec::new()),
             length: Vec::new(),
             owner: Vec::new(),
+            kind: Vec::new(),
         }
     }
 }
@@ -44,11 +46,12 @@ impl<const D: usize> Segments<D> {
         self.start.iter_mut().chain(&mut self.tangent).for_each(Vec::clear);
         self.length.clear();
         self.owner.clear();
+        self.kind.clear();
     }
 
-    /// Adds the segment from `start` to `end` (µm) of the shaft `owner`; one without length is left out.
+    /// Adds the segment from `start` to `end` (µm) of the shaft `owner`, which is of a `kind`; one without length is left out.
     #[inline]
-    pub fn push(&mut self, start: [f64; D], end: [f64; D], owner: u32) {
+    pub fn push(&mut self, start: [f64; D], end: [f64; D], (owner, kind): (u32, u32)) {
         let chord: [f64; D] = std::array::from_fn(|k| end[k] - start[k]);
         let length = dot(&chord, &chord).sqrt();
         if length > 0.0 {
@@ -58,6 +61,7 @@ impl<const D: usize> Segments<D> {
             }
             self.length.push(length);
             self.owner.push(owner);
+            self.kind.push(kind);
         }
     }
 }
@@ -86,13 +90,21 @@ pub struct Touch<const D: usize> {
 const BATCH: usize = 64;
 /// Partial sums; the order of summation depends on this number, never on the width of registers.
 const LANES: usize = 8;
+const ZEROS: [f64; BATCH] = [0.0; BATCH];
 const _: () = assert!(BATCH.is_multiple_of(LANES));
+
+/// How a batch of segments is seen: two bits for each, the number of its [`View`].
+type Views = [u64; 2];
+const PAIRS: usize = BATCH / 2;
+/// The bits of those seen whole; the others tell of those seen in part.
+const WHOLE: u64 = 0x5555_5555_5555_5555;
+const _: () = assert!(PAIRS * 2 == u64::BITS as usize && View::Whole as u64 == 1 && View::Part as u64 == 2);
 
 /// Work memory of a cone that sums what it feels.
 #[derive(Debug)]
 pub struct Contacts<const D: usize> {
     arch: Arch,
-    views: Vec<u64>,
+    views: Vec<Views>,
     picked: [Vec<u32>; 2],
     batch: Batch<D>,
 }
@@ -116,53 +128,76 @@ impl<const D: usize> Default for Contacts<D> {
 }
 
 impl<const D: usize> Contacts<D> {
-    /// The sum of a law over all segments but those of the shaft `own`, each times the adhesion to its shaft, as a cone at `x` (µm)
-    /// with unit heading `e` feels them.
+    /// The sum of a law over all segments but those of the shaft `own`, each times the adhesion to its kind, as a cone at `x` (µm)
+    /// with unit heading `e` feels them. A kind that `adhesion` has no number for is felt like its last.
     pub fn sum(
         &mut self,
         (x, e): ([f64; D], [f64; D]),
         segments: &Segments<D>,
         own: u32,
         (felt, law): (&Felt, &impl ContactPull<D>),
-        adhesion: impl Fn(u32) -> f64,
+        adhesion: &[f64],
     ) -> [f64; D] {
-        let n = segments.len();
-        if self.views.len() < n {
-            self.views.resize(n, View::Nothing as u64);
-        }
-        self.arch.dispatch(Look { felt, x, e, segments, own, views: &mut self.views[..n] });
-        select(&mut self.picked, &self.views[..n]);
+        self.views.resize(segments.len().div_ceil(BATCH), Views::default());
+        self.arch.dispatch(Look { felt, x, e, segments, own, views: &mut self.views });
+        let [whole, part] = &mut self.picked;
+        select(whole, self.views.iter().flatten().map(|pairs| pairs & WHOLE));
+        select(part, self.views.iter().flatten().map(|pairs| pairs & !WHOLE));
         let Self { arch, picked: [whole, part], batch, .. } = self;
         let mut sums = [[0.0; LANES]; D];
         for picked in whole.chunks(BATCH) {
-            let count = batch.fill(segments, picked, &adhesion);
+            let count = arch.dispatch(Fill { segments, picked, adhesion, batch });
             arch.dispatch(Integrate::<D, true, _> { felt, x, e, law, count, batch, sums: &mut sums });
         }
         for picked in part.chunks(BATCH) {
-            let count = batch.fill(segments, picked, &adhesion);
+            let count = arch.dispatch(Fill { segments, picked, adhesion, batch });
             arch.dispatch(Integrate::<D, false, _> { felt, x, e, law, count, batch, sums: &mut sums });
         }
         sums.map(|[a, b, c, d, e, f, g, h]| ((a + b) + (c + d)) + ((e + f) + (g + h)))
     }
 }
 
-impl<const D: usize> Batch<D> {
-    /// Copies picked segments together; what fills up the last lanes is the last of them with no adhesion.
-    /// Returns the number of lanes in use.
-    fn fill(&mut self, segments: &Segments<D>, picked: &[u32], adhesion: &impl Fn(u32) -> f64) -> usize {
-        let last = picked.last().copied().unwrap_or(0);
-        let padded = picked.len().next_multiple_of(LANES);
-        let all = picked.iter().copied().chain(std::iter::repeat_n(last, padded - picked.len()));
-        for (to, from) in all.enumerate() {
-            let from = from as usize;
-            for k in 0..D {
-                self.start[k][to] = segments.start[k][from];
-                self.tangent[k][to] = segments.tangent[k][from];
-            }
-            self.length[to] = segments.length[from];
-            self.adhesion[to] = if to < picked.len() { adhesion(segments.owner[from]) } else { 0.0 };
+/// Between the passes: picked segments are copied together. What fills up the last lanes is the last of them with no adhesion.
+/// Returns the number of lanes in use.
+struct Fill<'a, const D: usize> {
+    segments: &'a Segments<D>,
+    picked: &'a [u32],
+    adhesion: &'a [f64],
+    batch: &'a mut Batch<D>,
+}
+
+impl<const D: usize> WithSimd for Fill<'_, D> {
+    type Output = usize;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) -> usize {
+        let Self { segments, picked, adhesion, batch } = self;
+        let Some(&last) = picked.last() else { return 0 };
+        let count = picked.len().min(BATCH);
+        let padded = count.next_multiple_of(LANES);
+        let mut places = [last; BATCH];
+        places[..count].copy_from_slice(&picked[..count]);
+        let places = &places[..padded];
+        for k in 0..D {
+            copy(&mut batch.start[k], &segments.start[k], places);
+            copy(&mut batch.tangent[k], &segments.tangent[k], places);
         }
+        copy(&mut batch.length, &segments.length, places);
+        let mut kinds = [0; BATCH];
+        copy(&mut kinds, &segments.kind, places);
+        copy(&mut batch.adhesion, adhesion, &kinds[..padded]);
+        batch.adhesion[count..padded].fill(0.0);
         padded
+    }
+}
+
+/// Copies the values at places together; a place past the end is the last. Without a case for that, gathers are vector code.
+#[inline(always)]
+fn copy<T: Copy>(to: &mut [T; BATCH], from: &[T], places: &[u32]) {
+    if let Some(last) = from.len().checked_sub(1) {
+        for (to, &place) in to.iter_mut().zip(places) {
+            *to = from[(place as usize).min(last)];
+        }
     }
 }
 
@@ -174,7 +209,7 @@ struct Look<'a, const D: usize> {
     e: [f64; D],
     segments: &'a Segments<D>,
     own: u32,
-    views: &'a mut [u64],
+    views: &'a mut [Views],
 }
 
 impl<const D: usize> WithSimd for Look<'_, D> {
@@ -182,16 +217,45 @@ impl<const D: usize> WithSimd for Look<'_, D> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) {
-        let n = self.views.len();
-        let start = self.segments.start.each_ref().map(|column| &column[..n]);
-        let tangent = self.segments.tangent.each_ref().map(|column| &column[..n]);
-        let (length, owner) = (&self.segments.length[..n], &self.segments.owner[..n]);
-        for i in 0..n {
-            let (sight, _) = look(start.map(|c| c[i]), tangent.map(|c| c[i]), length[i], self.x, self.e);
-            let view = self.felt.view(&sight) as u64;
-            self.views[i] = if owner[i] == self.own { View::Nothing as u64 } else { view };
+        let (segments, n) = (self.segments, self.segments.len());
+        let (mut starts, mut tangents, mut lengths) = ([[0.0; BATCH]; D], [[0.0; BATCH]; D], [0.0; BATCH]);
+        let (mut owners, mut seen) = ([0; BATCH], [0; BATCH]);
+        for (views, first) in self.views.iter_mut().zip((0..n).step_by(BATCH)) {
+            let start = batches(&segments.start, first, &mut starts);
+            let tangent = batches(&segments.tangent, first, &mut tangents);
+            let length = batch(&segments.length, first, &mut lengths);
+            let owner = batch(&segments.owner, first, &mut owners);
+            for i in 0..BATCH {
+                let (sight, _) = look(start.map(|c| c[i]), tangent.map(|c| c[i]), length[i], self.x, self.e);
+                let view = self.felt.view(&sight) as u64;
+                seen[i] = if owner[i] == self.own { View::Nothing as u64 } else { view };
+            }
+            seen[BATCH.min(n - first)..].fill(View::Nothing as u64);
+            let pairs = |half: usize| (0..PAIRS).fold(0, |pairs, i| pairs | (seen[half * PAIRS + i] << (2 * i)));
+            *views = [pairs(0), pairs(1)];
         }
     }
+}
+
+/// [`batch`] of each column.
+#[inline(always)]
+fn batches<'a, const D: usize>(
+    columns: &'a [Vec<f64>; D],
+    first: usize,
+    buffers: &'a mut [[f64; BATCH]; D],
+) -> [&'a [f64; BATCH]; D] {
+    let mut of_column = columns.iter().zip(buffers).map(|(column, buffer)| batch(column, first, buffer));
+    std::array::from_fn(|_| of_column.next().unwrap_or(&ZEROS))
+}
+
+/// A batch of a column; the last one, which is shorter, in a buffer whose end is left as it is.
+#[inline(always)]
+fn batch<'a, T: Copy>(column: &'a [T], first: usize, buffer: &'a mut [T; BATCH]) -> &'a [T; BATCH] {
+    let rest = &column[first..];
+    rest.first_chunk().unwrap_or_else(|| {
+        buffer[..rest.len()].copy_from_slice(rest);
+        buffer
+    })
 }
 
 /// The second pass: a batch is integrated and added up; one that is not `WHOLE` is cut by the sector.
@@ -260,21 +324,15 @@ fn dot<const D: usize>(a: &[f64; D], b: &[f64; D]) -> f64 {
     sum
 }
 
-/// The places of what is seen whole and of what is seen in part, ascending.
-fn select([whole, part]: &mut [Vec<u32>; 2], views: &[u64]) {
-    for places in [&mut *whole, &mut *part] {
-        places.clear();
-        places.resize(views.len(), 0);
+/// The places of all pairs of bits with one that is set, ascending.
+fn select(places: &mut Vec<u32>, pairs: impl Iterator<Item = u64>) {
+    places.clear();
+    for (first, mut bits) in (0..).step_by(PAIRS).zip(pairs) {
+        while bits != 0 {
+            places.push(first + bits.trailing_zeros() / 2);
+            bits &= bits - 1;
+        }
     }
-    let mut count = [0; 2];
-    for (i, &view) in (0..).zip(views) {
-        whole[count[0]] = i;
-        part[count[1]] = i;
-        count[0] += usize::from(view == View::Whole as u64);
-        count[1] += usize::from(view == View::Part as u64);
-    }
-    whole.truncate(count[0]);
-    part.truncate(count[1]);
 }
 
 #[cfg(test)]
@@ -299,31 +357,35 @@ mod tests {
         for i in 0..count {
             let share = |k: u32| (f64::from(i) * 0.618_033_988_75 * f64::from(2 * k + 1)).fract();
             let start = [16.0 * share(0) - 8.0, 16.0 * share(1) - 8.0];
-            segments.push(start, [start[0] + 6.0 * share(2) - 3.0, start[1] + 6.0 * share(3)], i % 40);
+            segments.push(start, [start[0] + 6.0 * share(2) - 3.0, start[1] + 6.0 * share(3)], (i % 40, i % 3));
             if i % every == 0 {
-                segments.push([50.0 + f64::from(i), 3.0], [60.0, 9.0], i % 40);
+                segments.push([50.0 + f64::from(i), 3.0], [60.0, 9.0], (i % 40, i % 3));
             }
         }
         segments
     }
 
-    fn sum(segments: &Segments<2>, adhesion: impl Fn(u32) -> f64) -> [f64; 2] {
+    fn sum(segments: &Segments<2>, adhesion: &[f64]) -> [f64; 2] {
         Contacts::default().sum(([0.3, -0.2], [0.6, 0.8]), segments, 7, (&FELT, &Toward), adhesion)
     }
 
     #[test]
     fn the_sum_over_many_is_the_sum_of_each_times_its_adhesion_without_the_own_shaft() {
-        let adhesion = |shaft: u32| f64::from(shaft) * 0.1 - 1.0;
+        let adhesion = [0.7, -0.4, 1.9];
         let many = around(500, 1000);
         let mut expected = [0.0; 2];
         for i in 0..many.len() {
             let mut one = Segments::default();
             let start = many.start.each_ref().map(|c| c[i]);
-            one.push(start, std::array::from_fn(|k| start[k] + many.length[i] * many.tangent[k][i]), many.owner[i]);
-            let pull = if many.owner[i] == 7 { [0.0; 2] } else { sum(&one, adhesion) };
+            one.push(
+                start,
+                std::array::from_fn(|k| start[k] + many.length[i] * many.tangent[k][i]),
+                (many.owner[i], many.kind[i]),
+            );
+            let pull = if many.owner[i] == 7 { [0.0; 2] } else { sum(&one, &adhesion) };
             expected = [expected[0] + pull[0], expected[1] + pull[1]];
         }
-        let found = sum(&many, adhesion);
+        let found = sum(&many, &adhesion);
         assert!(expected[0].hypot(expected[1]) > 10.0);
         assert!((found[0] - expected[0]).hypot(found[1] - expected[1]) < 1e-11, "{found:?} {expected:?}");
     }
@@ -331,7 +393,7 @@ mod tests {
     #[test]
     fn what_is_not_felt_changes_no_bit() {
         for (count, every) in [(1, 1), (63, 2), (64, 7), (65, 1), (500, 3)] {
-            assert_eq!(sum(&around(count, every), |_| 1.0), sum(&around(count, 1000), |_| 1.0), "{count} {every}");
+            assert_eq!(sum(&around(count, every), &[1.0; 3]), sum(&around(count, 1000), &[1.0; 3]), "{count} {every}");
         }
     }
 }

@@ -27,7 +27,7 @@ fn main() {
     pool.install(|| {
         println!("cue field, 2 cues, gradients at {POINTS} points; median of {REPETITIONS}, one thread");
         println!("{:>9} {:>10} {:>9} {:>11} {:>10}", "h/L", "vertices", "seconds", "gradient %", "heading");
-        for size in [0.05, 0.035, 0.025, 0.0177, 0.0125, 0.0088, 0.00625, 0.0044] {
+        for size in [0.05, 0.035, 0.025, 0.0177, 0.0145, 0.0125, 0.0088, 0.00625, 0.0044] {
             cue_field(size);
         }
         println!("matrix, clamped block, first load step; median of {REPETITIONS}, one thread");

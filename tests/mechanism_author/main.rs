@@ -6,6 +6,8 @@ mod combined_signal;
 #[path = "../common/mod.rs"]
 mod common;
 mod disc_field;
+#[path = "../verification/figures.rs"]
+mod figures;
 mod front;
 mod galvanotaxis;
 mod trajectories;

@@ -10,6 +10,9 @@ use tropism::numerics::recovery::GradientRecovery;
 use tropism::numerics::simplex_mesh::SimplexMesh;
 use tropism::numerics::triangulate::{FittedMesh, MeshOptions, triangulate};
 
+use crate::block::fitted_order;
+use crate::figures::{self, Curve};
+
 fn unstructured(size: f64) -> SimplexMesh<2> {
     let outlines = [Outline::disc([0.4, 0.6], 0.1, size)];
     triangulate(&PlanarDomain::rectangle(1.5, 1.0), &outlines, &MeshOptions::of_size(size)).unwrap().mesh
@@ -61,25 +64,67 @@ fn quadratics_are_recovered_exactly_in_space() {
 #[test]
 fn the_recovered_gradient_is_of_second_order_inside_and_at_the_border() {
     let (a, b) = (TAU / 1.5, PI);
-    let mut errors = Vec::new();
-    for size in [0.08, 0.04, 0.02, 0.01] {
+    let exact = |[x, y]: [f64; 2]| [-a * (a * x).sin() * (b * y).cos(), -b * (a * x).cos() * (b * y).sin()];
+    let sizes = [0.08, 0.04, 0.02, 0.01];
+    let (mut errors, mut raw) = (Vec::new(), Vec::new());
+    for size in sizes {
         let mesh = unstructured(size);
         let x = mesh.vertices();
         let c: Vec<f64> = x.iter().map(|[x, y]| (a * x).cos() * (b * y).cos()).collect();
         let gradient = GradientRecovery::new(&mesh).recover(x, &c, true);
         let (mut inside, mut border) = ((0.0, 0.0), (0.0, 0.0));
         for (&[x, y], g) in x.iter().zip(gradient) {
-            let exact = [-a * (a * x).sin() * (b * y).cos(), -b * (a * x).cos() * (b * y).sin()];
-            let rim = x == 0.0 || y == 0.0 || x == 1.5 || y == 1.0;
+            let rim = is_on_rim([x, y]);
             let sum = if rim { &mut border } else { &mut inside };
-            *sum = (sum.0 + off(g, exact).powi(2), sum.1 + 1.0);
+            *sum = (sum.0 + off(g, exact([x, y])).powi(2), sum.1 + 1.0);
             let normal = if x == 0.0 || x == 1.5 { g[0] } else { g[1] };
             assert!(!rim || normal.abs() < 1e-12);
         }
         errors.push([inside, border].map(|(sum, count): (f64, f64)| (sum / count).sqrt()));
+        raw.push(raw_errors(&mesh, &c, exact));
     }
     let order = |place: usize| (errors[0][place] / errors[3][place]).log2() / 3.0;
     assert!(order(0) > 1.8 && order(1) > 1.8, "{errors:?}");
+    draw_recovery(&sizes, &errors, &raw);
+}
+
+/// Root mean square errors, over the corners of cells inside and at the border, of the gradient of each cell's own values.
+fn raw_errors(mesh: &SimplexMesh<2>, c: &[f64], exact: impl Fn([f64; 2]) -> [f64; 2]) -> [f64; 2] {
+    let x = mesh.vertices();
+    let mut sums = [(0.0, 0.0); 2];
+    for cell in 0..mesh.cell_count() {
+        let mut g = [[0.0; 2]; 3];
+        mesh.barycentric_gradients(x, cell, &mut g);
+        let corners = mesh.cell(cell);
+        let raw = [0, 1].map(|k| (0..3).map(|j| c[corners[j] as usize] * g[j][k]).sum::<f64>());
+        for at in corners.iter().map(|&corner| x[corner as usize]) {
+            let sum = &mut sums[usize::from(is_on_rim(at))];
+            *sum = (sum.0 + off(raw, exact(at)).powi(2), sum.1 + 1.0);
+        }
+    }
+    sums.map(|(sum, count)| (sum / count).sqrt())
+}
+
+fn is_on_rim([x, y]: [f64; 2]) -> bool {
+    x == 0.0 || y == 0.0 || x == 1.5 || y == 1.0
+}
+
+/// Recovered beside raw: inside, and at the border.
+fn draw_recovery(sizes: &[f64], recovered: &[[f64; 2]], raw: &[[f64; 2]]) {
+    let axes = ["mesh size (height of the domain = 1)", "rms error of ∇c (amplitude = height = 1)"];
+    let plots = ["inside", "at the border"].map(|title| {
+        let place = usize::from(title != "inside");
+        let curve = |name: &str, errors: &[[f64; 2]], theory: f64| {
+            let errors: Vec<f64> = errors.iter().map(|e| e[place]).collect();
+            Curve::new(name, sizes, &errors, [theory, fitted_order(sizes, &errors)])
+        };
+        figures::orders(title, axes, &[curve("raw", raw, 1.0), curve("recovered", recovered, 2.0)])
+    });
+    let words = [
+        "Cue fields: the recovered gradient",
+        "from nodal values of a smooth field, at the vertices of unstructured meshes; the numbers are fitted orders",
+    ];
+    figures::write("recovered_gradient", words, &plots);
 }
 
 fn reference_mesh(size: f64) -> FittedMesh {

@@ -3,6 +3,7 @@
 mod block;
 mod elasticity;
 mod equilibria;
+mod figures;
 mod gradient_recovery;
 mod load_path;
 mod quadratic_field;

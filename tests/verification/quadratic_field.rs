@@ -1,6 +1,5 @@
 //! Eq. (2) in quadratic elements: orders, closed form, independent reference, budget, rate.
 
-use crate::reaction_diffusion::radial_mesh;
 use std::f64::consts::{PI, TAU};
 
 use serde_json::Value;
@@ -12,6 +11,9 @@ use tropism::numerics::quadrature::simplex_rule;
 use tropism::numerics::reaction_diffusion::{Mass, ReactionDiffusion, ReactionDiffusionError, Source};
 use tropism::numerics::simplex_mesh::{SimplexMesh, structured_rectangle};
 use tropism::numerics::triangulate::{FittedMesh, MeshOptions, triangulate};
+
+use crate::figures::{self, Curve};
+use crate::reaction_diffusion::{manufactured_errors as linear_errors, radial_mesh};
 
 const LAW: ReactionDiffusion = ReactionDiffusion { diffusion: 1.0, degradation: 100.0, mass: Mass::Consistent };
 
@@ -112,6 +114,38 @@ fn quadratic_values_converge_with_order_three_and_gradients_with_order_two() {
     let orders = [0, 1, 2].map(|k| fitted_order(&errors.map(|e| e[k])));
     assert!((orders[0] - 3.0).abs() < 0.1 && (orders[1] - 2.0).abs() < 0.1, "{orders:?} {errors:?}");
     assert!(orders[2] > 1.9 && errors[3][2] < errors[3][1], "{orders:?} {errors:?}");
+    draw_elements(&errors, orders);
+}
+
+/// Linear beside quadratic elements: c, and its gradient.
+fn draw_elements(errors: &[[f64; 3]; 4], orders: [f64; 3]) {
+    let sizes = [8.0, 16.0, 32.0, 64.0].map(|n: f64| 1.0 / n);
+    let linear = |mass| [8, 16, 32, 64].map(|n| linear_errors(n, &ReactionDiffusion { mass, ..LAW }));
+    let (lumped, consistent) = (linear(Mass::Lumped), linear(Mass::Consistent));
+    let curve =
+        |name: &str, errors: [f64; 4], theory: f64| Curve::new(name, &sizes, &errors, [theory, fitted_order(&errors)]);
+    let quadratic =
+        |name: &str, k: usize, theory: f64| Curve::new(name, &sizes, &errors.map(|e| e[k]), [theory, orders[k]]);
+    let x = "mesh size (height of the domain = 1)";
+    let values = [
+        curve("P1, lumped mass", lumped.map(|e| e.0), 2.0),
+        curve("P1, consistent mass", consistent.map(|e| e.0), 2.0),
+        quadratic("P2", 0, 3.0),
+    ];
+    let gradients = [
+        curve("P1, raw", consistent.map(|e| e.1), 1.0),
+        quadratic("P2, raw", 1, 2.0),
+        quadratic("P2, averaged at the nodes", 2, 2.0),
+    ];
+    let plots = [
+        figures::orders("concentration", [x, "L2 error of c (amplitude of c = 1)"], &values),
+        figures::orders("gradient", [x, "L2 error of ∇c (amplitude = height = 1)"], &gradients),
+    ];
+    let words = [
+        "Cue fields: linear and quadratic elements",
+        "manufactured solution of eq. (2) on a rectangle, kL²/D = 100, structured meshes; the numbers are fitted orders",
+    ];
+    figures::write("elements", words, &plots);
 }
 
 /// A disc domain of radius 1 about the origin with a fitted disc source of radius 0.3.

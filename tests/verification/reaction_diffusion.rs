@@ -43,7 +43,7 @@ fn manufactured([x, y]: [f64; 2], k: f64) -> (f64, [f64; 2], f64) {
 }
 
 /// L2 and H1 errors of P1 for the manufactured solution on the stated mesh with `n` cells in height.
-fn manufactured_errors(n: usize, law: &ReactionDiffusion) -> (f64, f64) {
+pub(crate) fn manufactured_errors(n: usize, law: &ReactionDiffusion) -> (f64, f64) {
     let mesh = structured_rectangle(1.5, 1.0, 3 * n / 2, n).unwrap();
     let x = mesh.vertices();
     let rule = simplex_rule::<2>(6);

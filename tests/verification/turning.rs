@@ -7,6 +7,7 @@ use tropism::numerics::runge_kutta::{BOGACKI_SHAMPINE, ButcherTableau, EULER, HE
 use tropism::numerics::turning::{integral_of_turn, perpendicular_part, turn};
 
 use crate::block::{array, fitted_order, number, reference};
+use crate::figures::{self, Curve};
 
 fn heading(angle: f64) -> Vector3<f64> {
     Vector3::new(angle.cos(), angle.sin(), 0.0)
@@ -49,12 +50,25 @@ fn explicit(method: &ButcherTableau, start: f64, steps: usize) -> Vector3<f64> {
 fn explicit_methods_approach_the_closed_form_with_their_order() {
     let exact = turn(&heading(2.0), &Vector3::x(), 2.0);
     let second = ButcherTableau { b: BOGACKI_SHAMPINE.embedded, order: 2, name: "embedded", ..BOGACKI_SHAMPINE };
+    let steps = [16, 32, 64, 128];
+    let mut curves = Vec::new();
     for method in [EULER, HEUN, RK4, BOGACKI_SHAMPINE, second] {
-        let steps = [16, 32, 64, 128];
         let errors = steps.map(|steps| (explicit(&method, 2.0, steps) - exact).norm());
         let order = fitted_order(&steps.map(|steps| 1.0 / steps as f64), &errors);
         assert!((order - f64::from(method.order)).abs() < 0.25, "{}: order {order}, {errors:?}", method.name);
+        let sizes = steps.map(|steps| 2.0 / steps as f64);
+        curves.push(Curve::new(method.name, &sizes, &errors, [f64::from(method.order), order]));
     }
+    let (sizes, errors) = half_turns();
+    let rotation = [Curve::new("half turns at midpoints", &sizes, &errors, [2.0, fitted_order(&sizes, &errors)])];
+    let axes = ["κΔt", "error of the unit heading"];
+    let plots =
+        [figures::orders("a constant pull", axes, &curves), figures::orders("a pull that turns", axes, &rotation)];
+    let words = [
+        "The turning law",
+        "against closed forms; the numbers are fitted orders; under a constant pull the rotation is exact for any step",
+    ];
+    figures::write("turning", words, &plots);
 }
 
 #[test]
@@ -64,8 +78,8 @@ fn an_euler_step_lengthens_the_heading_as_the_model_says() {
     assert!((explicit(&EULER, angle, 1).norm() - stretched).abs() < 1e-15 * 4.0);
 }
 
-#[test]
-fn a_pull_that_turns_is_followed_with_order_two_by_half_turns_at_midpoints() {
+/// κΔt and the errors of half turns at midpoints under a pull that turns.
+fn half_turns() -> ([f64; 4], [f64; 4]) {
     // The pull rotates at Ω; relative to it β' = Ω − κ sin β has a steady lag asin(Ω/κ): the reference is that closed form.
     let (rate, spin) = (3.0f64, 1.2f64);
     let pull = |time: f64| heading(spin * time);
@@ -79,6 +93,12 @@ fn a_pull_that_turns_is_followed_with_order_two_by_half_turns_at_midpoints() {
         (e - heading(spin * 2.0 + lag)).norm()
     };
     let steps = [10, 20, 40, 80];
-    let order = fitted_order(&steps.map(|steps| 1.0 / steps as f64), &steps.map(error));
+    (steps.map(|steps| rate * 2.0 / steps as f64), steps.map(error))
+}
+
+#[test]
+fn a_pull_that_turns_is_followed_with_order_two_by_half_turns_at_midpoints() {
+    let (sizes, errors) = half_turns();
+    let order = fitted_order(&sizes, &errors);
     assert!((order - 2.0).abs() < 0.1, "{order}");
 }

@@ -7,7 +7,7 @@
 //! flattens where what is left is the other's.
 
 use super::cones::MOST_AXONS;
-use super::work_precision::{ErrorKind, Factor, Point, short};
+use super::work_precision::{ErrorKind, Factor, Point, short, time};
 use crate::model::observables::Observables;
 use crate::model::tissue::Configuration;
 use crate::scenario::load::Loaded;
@@ -19,16 +19,16 @@ use crate::study::run::RunError;
 use serde_json::Value;
 use std::collections::BTreeMap;
 
-/// Settings over the scene's own, by √2.
+/// Settings over the scene's own, by √2; lines that refine one alone have every other.
 const SCALES: [f64; 7] = [4.0, 2.828, 2.0, 1.414, 1.0, 0.707, 0.5];
-/// Place of the scene's own among them.
-const OWN: usize = 4;
+/// The scene's own among them.
+const OWN: f64 = 1.0;
 /// The reference on the joint path, and the setting that it is judged by.
 const REFERENCE: f64 = 0.25;
 const SECOND: f64 = 0.354;
-/// Method, and whether it scales mesh size and step.
-const METHODS: [(&str, bool, bool); 3] =
-    [("together", true, true), ("mesh only", true, false), ("step only", false, true)];
+/// A name, and whether mesh size and step are scaled.
+type Method = (&'static str, bool, bool);
+const METHODS: [Method; 3] = [("together", true, true), ("mesh only", true, false), ("step only", false, true)];
 /// The largest tolerance of the load path that a scene may have.
 const LARGEST_TOLERANCE: f64 = 0.1;
 /// Two errors within this share of one another are alike.
@@ -68,19 +68,18 @@ impl Bench<'_> {
     fn chart(&self, tick: &dyn Fn(f64)) -> Result<Factor, RunError> {
         let exact = self.tips(REFERENCE)?;
         let floor = errors(&self.tips(SECOND)?, &exact);
+        let jobs: Vec<_> =
+            METHODS.into_iter().flat_map(|method| scales(method).map(move |scale| (method, scale))).collect();
         let mut points: Vec<Point> = Vec::new();
-        let jobs = (METHODS.len() * SCALES.len()) as f64;
-        for (line, method) in METHODS.into_iter().enumerate() {
-            for (place, scale) in SCALES.into_iter().enumerate() {
-                tick((line * SCALES.len() + place) as f64 / jobs);
-                let setting = self.setting(method, scale);
-                // All lines meet in the scene's own setting: it is measured once, and marked in the first.
-                let point = match points.get(OWN).filter(|_| place == OWN) {
-                    Some(own) => Point { method: setting.method, default: false, ..own.clone() },
-                    None => self.measured(&setting, &exact)?,
-                };
-                points.push(point);
-            }
+        for (done, (method, scale)) in jobs.iter().enumerate() {
+            tick(done as f64 / jobs.len() as f64);
+            let setting = self.setting(*method, *scale);
+            // All lines meet in the scene's own setting: it is measured once, and marked in the first.
+            let point = match points.iter().find(|point| point.default).filter(|_| *scale == OWN) {
+                Some(own) => Point { method: setting.method, set: setting.set, default: false, ..own.clone() },
+                None => self.measured(&setting, &exact)?,
+            };
+            points.push(point);
         }
         let kind = |(name, label): &(&str, &str)| ErrorKind {
             name: (*name).to_owned(),
@@ -107,12 +106,11 @@ impl Bench<'_> {
             ),
             advice: String::new(),
         };
-        let parts = [advice(&factor), factor.choice(&factor.errors[0])];
-        factor.advice = parts.join(" ").trim().to_owned();
+        factor.advice = advice(&factor);
         Ok(factor)
     }
 
-    fn setting(&self, (method, by_mesh, by_step): (&str, bool, bool), scale: f64) -> Setting {
+    fn setting(&self, (method, by_mesh, by_step): Method, scale: f64) -> Setting {
         let size = self.scene.scene.tissue.mesh_size.0 * if by_mesh { scale } else { 1.0 };
         let step = self.scene.scene.time.step.0 * if by_step { scale } else { 1.0 };
         let mut set = vec![format!("/tissue/mesh_size={size:e}"), format!("/time/step={step:e}")];
@@ -125,7 +123,7 @@ impl Bench<'_> {
             words: format!("mesh size {} um, step {} min", short(size), short(60.0 * step)),
             knob: scale,
             set,
-            default: by_mesh && by_step && scale == SCALES[OWN],
+            default: by_mesh && by_step && scale == OWN,
         }
     }
 
@@ -161,40 +159,59 @@ fn errors(found: &[ConeView], exact: &[ConeView]) -> BTreeMap<String, f64> {
     KINDS.iter().zip(values).map(|((name, _), value)| ((*name).to_owned(), value)).collect()
 }
 
-/// Which of mesh and step the error of the scene's own setting comes from, and how far the other may go.
+fn scales((_, by_mesh, by_step): Method) -> impl Iterator<Item = f64> {
+    SCALES.into_iter().step_by(if by_mesh && by_step { 1 } else { 2 })
+}
+
+/// Which of mesh and step the error of the scene's own setting comes from, how far the other may go, and what is the fastest
+/// setting with no more error.
 fn advice(factor: &Factor) -> String {
     let Some(kind) = factor.errors.first() else { return String::new() };
-    let line = |method: &str| -> Vec<(f64, &Point)> {
+    let value = |point: &Point| point.errors.get(&kind.name).copied().unwrap_or(f64::NAN);
+    let Some(own) = factor.points.iter().find(|point| point.default) else { return String::new() };
+    let error = value(own);
+    let front = factor.front(kind);
+    let fastest = front.iter().find(|point| value(point) <= error.max(kind.floor)).map_or(String::new(), |point| {
+        let (setting, found, seconds) = (&point.setting, short(value(point)), time(point.seconds.median));
+        format!(
+            " Fastest with no more error: {setting} ({found} in {seconds}; the scene's own in {}).",
+            time(own.seconds.median)
+        )
+    });
+    format!("{}{fastest}", dominance(factor, kind, error))
+}
+
+fn dominance(factor: &Factor, kind: &ErrorKind, own: f64) -> String {
+    let line = |method: &str| -> Vec<(f64, f64)> {
         let of_method = factor.points.iter().filter(|point| point.method == method);
-        of_method.filter_map(|point| Some((*point.errors.get(&kind.name)?, point))).collect()
+        of_method.filter_map(|point| Some((point.knob, *point.errors.get(&kind.name)?))).collect()
     };
-    let lines = [line(METHODS[1].0), line(METHODS[2].0)];
-    let [Some(&(own, _)), Some(&(mesh, _)), Some(&(step, _))] = [lines[0].get(OWN), lines[0].last(), lines[1].last()]
-    else {
-        return String::new();
-    };
-    let matters =
-        |line: &[(f64, &Point)]| line.iter().any(|(error, _)| (error - own).abs() > kind.floor.max(ALIKE * own));
-    if !lines.iter().any(|line| matters(line)) {
-        return "Neither mesh size nor step changes tips by more than the reference leaves in doubt.".to_owned();
+    let [meshes, steps] = [line(METHODS[1].0), line(METHODS[2].0)];
+    let doubt = kind.floor.max(ALIKE * own);
+    if meshes.iter().chain(&steps).all(|(_, error)| (error - own).abs() <= doubt) {
+        return "Neither mesh size nor step changes tips by more than a tenth of their error or what the reference leaves in doubt."
+            .to_owned();
     }
+    if own <= kind.floor {
+        return format!("The scene's own error lies below what the reference leaves in doubt ({}).", short(kind.floor));
+    }
+    let finest = |line: &[(f64, f64)]| line.last().map_or(own, |(_, error)| *error);
+    let (mesh, step) = (finest(&meshes), finest(&steps));
     let parts = format!(
         "half the mesh size leaves {} of its error of {}, half the step {}",
         short(mesh),
         short(own),
         short(step)
     );
-    if own <= kind.floor {
-        return format!("The scene's own error lies below what the reference leaves in doubt ({}).", short(kind.floor));
-    }
     if (mesh - step).abs() <= ALIKE * own {
         return format!("Mesh and step weigh alike in the scene's own setting: {parts}.");
     }
-    let (leads, other, slack) = if mesh < step { ("mesh", "step", &lines[1]) } else { ("step", "mesh", &lines[0]) };
+    let (leads, other, line) = if mesh < step { ("mesh", "step", &steps) } else { ("step", "mesh size", &meshes) };
     // From the scene's own setting upward, as far as the error stays.
-    let alike = slack[..OWN].iter().rev().take_while(|(error, _)| *error <= (1.0 + ALIKE) * own).last();
-    let further = alike.map_or(String::new(), |(_, point)| {
-        format!("; the {other} may be {} times as large for a tenth more of it", short(point.knob))
-    });
+    let coarser = line.iter().rev().filter(|(scale, _)| *scale > OWN);
+    let further =
+        coarser.take_while(|(_, error)| *error <= (1.0 + ALIKE) * own).last().map_or(String::new(), |(scale, _)| {
+            format!("; {} times the {other} adds less than a tenth to it", short(*scale))
+        });
     format!("The {leads} dominates the error of the scene's own setting: {parts}{further}.")
 }

@@ -103,12 +103,39 @@ fn cones_show_the_orders_of_their_methods_and_neighbour_searches_agree() {
 }
 
 #[test]
+fn mesh_and_step_together_fall_with_order_and_tell_which_of_them_the_error_comes_from() {
+    let mut finer = scene();
+    finer["tissue"]["mesh_size"] = json!(20);
+    let found = charted(&finer, &["together"]);
+    let [factor] = found.factors.as_slice() else { panic!("one factor") };
+    assert_sound(factor);
+    assert_eq!(factor.methods(), ["together", "mesh only", "step only"]);
+    let joint = order(factor, "tip", "together");
+    assert!((1.2..3.0).contains(&joint), "{joint}");
+    let own = factor.points.iter().find(|point| point.default).unwrap();
+    assert_eq!((own.method.as_str(), own.knob), ("together", 1.0));
+    let at = |method: &str, knob: f64| {
+        let point = points(factor, method).into_iter().find(|point| point.knob == knob).unwrap();
+        point.errors["tip"]
+    };
+    for method in ["mesh only", "step only"] {
+        assert_eq!(at(method, 1.0), own.errors["tip"], "lines meet in the scene's own setting");
+    }
+    // Fields on cells of 20 um are worse than steps of 4 min, so that only a finer mesh helps.
+    assert!(at("mesh only", 0.5) < 0.6 * own.errors["tip"] && at("step only", 0.5) > 0.9 * own.errors["tip"]);
+    assert!(at("together", 0.5) < 1.1 * at("mesh only", 0.5));
+    assert!(factor.advice.starts_with("The mesh dominates"), "{}", factor.advice);
+    let joint = points(factor, "together")[0];
+    assert!(joint.set.iter().any(|key| key == "/matrix/tolerance=1.6e-5"), "{:?}", joint.set);
+}
+
+#[test]
 fn a_scene_without_cues_motion_or_contact_has_no_chart_of_them() {
     let mut bare = scene();
     for name in ["matrix", "cues", "chemotaxis", "fasciculation"] {
         bare[name] = Value::Null;
     }
-    assert!(charted(&bare, &["cue_field", "matrix", "neighbours"]).factors.is_empty());
+    assert!(charted(&bare, &["cue_field", "matrix", "neighbours", "together"]).factors.is_empty());
 }
 
 fn tropism(folder: &Folder, arguments: &[&str]) -> Output {

@@ -21,7 +21,7 @@
 //! the choice is the same everywhere. The tolerance of the load path is ε/1000. Keys that the scene gives itself are
 //! kept. Ours: all of this.
 
-use super::laboratory::{Laboratory, cones, few_axons, run_until};
+use super::laboratory::{ConeView, Laboratory, cones, few_axons, root_mean_square, run_until};
 use super::run::{RunError, read};
 use crate::model::health::Counters;
 use crate::model::mechanism::Roster;
@@ -29,7 +29,6 @@ use crate::model::plan::Plan;
 use crate::model::tissue::{Configuration, Tissue};
 use crate::model::violation::Violation;
 use crate::scenario::load::{Loaded, Request, ScenarioErrors};
-use nalgebra::Vector3;
 use serde::Serialize;
 
 /// What one part of the error may come to where its sequence ends, over the accuracy asked for.
@@ -58,8 +57,8 @@ const MOST_VERTICES: f64 = 1e5;
 const VERTEX_IN_A_PASS: f64 = 10.0;
 /// Work for a vertex at each stage of a tissue that moves.
 const VERTEX_AT_A_STAGE: f64 = 0.02;
-/// What pilots leave out.
-const CHAOTIC: [&str; 2] = ["fasciculation", "heading_noise"];
+/// What pilots leave out: with it paths are chaotic.
+pub(super) const CHAOTIC: [&str; 2] = ["fasciculation", "heading_noise"];
 
 /// What was found for a scene that states an accuracy.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -159,12 +158,9 @@ struct Search<'a> {
     asked: f64,
 }
 
-/// Tips with the lengths of their paths.
-type Tips = Vec<(Vector3<f64>, f64)>;
-
 /// What a pilot run left.
 struct Pilot {
-    tips: Tips,
+    tips: Vec<ConeView>,
     counts: Counts,
 }
 
@@ -343,7 +339,7 @@ impl Search<'_> {
         let mut simulation = self.laboratory.assemble(&self.laboratory.load(&without, &set)?)?;
         run_until(&mut simulation, self.scene.scene.time.duration.0)?;
         let world = simulation.world();
-        let tips = cones(&simulation).iter().map(|cone| (cone.position, cone.length)).collect();
+        let tips = cones(&simulation);
         let (counters, vertices) = (world.resource::<Counters>(), world.resource::<Tissue>().mesh.vertex_count());
         let counts = Counts {
             cone_steps: counters.cone_steps as f64,
@@ -357,7 +353,7 @@ impl Search<'_> {
 }
 
 /// Root mean square of the distance between tips over the length of their paths; tips that have no path are left out.
-fn difference(coarse: &Tips, fine: &Tips) -> f64 {
-    let grown = coarse.iter().zip(fine).filter(|(_, fine)| fine.1 > 0.0);
-    super::laboratory::root_mean_square(grown.map(|(coarse, fine)| (coarse.0 - fine.0).norm() / fine.1))
+pub(super) fn difference(coarse: &[ConeView], fine: &[ConeView]) -> f64 {
+    let grown = coarse.iter().zip(fine).filter(|(_, fine)| fine.length > 0.0);
+    root_mean_square(grown.map(|(coarse, fine)| (coarse.position - fine.position).norm() / fine.length))
 }

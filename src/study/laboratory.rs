@@ -130,6 +130,20 @@ impl<'a> Laboratory<'a> {
         })
     }
 
+    /// Puts a scene together and runs it until `stop` (h) as often as settings are timed; the time is that of both.
+    ///
+    /// # Errors
+    /// A scene that cannot be assembled, or a fault while running.
+    pub fn timed_whole(&self, loaded: &Loaded, stop: f64) -> Result<(Simulation, Seconds), RunError> {
+        self.repeated(|| {
+            let mut simulation = self.assemble(loaded)?;
+            run_until(&mut simulation, stop)?;
+            simulation.lap("record");
+            let seconds = simulation.world().resource::<Stopwatch>().total();
+            Ok((simulation, seconds))
+        })
+    }
+
     fn repeated(
         &self,
         mut once: impl FnMut() -> Result<(Simulation, f64), RunError>,

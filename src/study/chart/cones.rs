@@ -10,7 +10,7 @@ use serde_json::Value;
 use std::collections::BTreeMap;
 
 /// Axons a population at most: enough for a root mean square, few enough for a reference far finer than the rest.
-const MOST_AXONS: u64 = 60;
+pub(super) const MOST_AXONS: u64 = 60;
 /// Steps as powers of two times the scene's own: two decades.
 const POWERS: [i32; 7] = [2, 1, 0, -1, -2, -3, -4];
 /// Step of the reference, likewise.

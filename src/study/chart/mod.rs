@@ -1,4 +1,5 @@
-//! `tropism chart SCENE`: error against time for every choice that a scene offers, one factor at a time.
+//! `tropism chart SCENE`: error against time for every choice that a scene offers, one factor at a time and then
+//! together.
 //!
 //! Every choice is a scenario key, so a chart is a set of variants of one scene: each is put together (and run, where that is
 //! what costs), timed several times in one process, and compared with a reference far finer than the rest, whose own error is
@@ -9,6 +10,7 @@ mod cue_field;
 mod matrix;
 mod neighbours;
 pub mod report;
+mod together;
 mod whole_scene;
 pub mod work_precision;
 
@@ -17,7 +19,7 @@ use super::run::RunError;
 use work_precision::Factor;
 
 /// Names of the factors, as `--only` takes them.
-pub const FACTORS: [&str; 5] = ["cue_field", "matrix", "cones", "neighbours", "whole_scene"];
+pub const FACTORS: [&str; 6] = ["cue_field", "matrix", "cones", "neighbours", "together", "whole_scene"];
 
 /// Error against time for the choices of a scene.
 #[derive(Debug, Clone, PartialEq)]
@@ -47,6 +49,7 @@ pub fn chart(laboratory: &Laboratory, only: &[String], tick: &dyn Fn(f64)) -> Re
             "matrix" => factors.extend(matrix::charts(laboratory, &tick)?),
             "cones" => factors.extend(cones::charts(laboratory, &tick)?),
             "neighbours" => factors.extend(neighbours::chart(laboratory, &tick)?),
+            "together" => factors.extend(together::chart(laboratory, &tick)?),
             _ => factors.push(whole_scene::chart(laboratory, &tick)?),
         }
     }

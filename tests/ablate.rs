@@ -70,7 +70,7 @@ fn the_arms_are_the_blocks_of_the_scene_in_the_order_of_the_roster_and_then_thei
         assert_eq!(arm.complete, !lost, "{}", arm.name);
     }
     let reason = arm(&found, "without cues").skipped.clone().unwrap();
-    assert!(reason.contains("/chemotaxis/receptors/attractant: there is no cue called `attractant`"), "{reason}");
+    assert!(reason.starts_with("/chemotaxis: the scene has no cues"), "{reason}");
     assert!(found.complete, "an arm that is skipped is no failure");
     // One seed has differences, but no interval.
     let difference = arm(&found, "without matrix").differences["length_um.mean"];
@@ -124,7 +124,9 @@ fn an_arm_that_is_the_full_model_differs_by_exactly_nothing() {
     let same = arm(&found, "without matrix");
     assert!(same.differences.len() > 20);
     for (measure, difference) in &same.differences {
-        assert_eq!((difference.mean, difference.low, difference.high), (0.0, Some(0.0), Some(0.0)), "{measure}");
+        // Not every run has every measure: one fascicle at a height in one seed has a mean size and no interval.
+        let end = (difference.n > 1).then_some(0.0);
+        assert_eq!((difference.mean, difference.low, difference.high), (0.0, end, end), "{measure}");
         assert!(!same.differs(measure));
     }
     assert!(found.arms[0].differences.is_empty(), "the full model is the control");
@@ -163,7 +165,7 @@ impl Mechanism for Fragile {
         if !self.late {
             return Err(InstallError::Solve("nothing holds it".into()));
         }
-        model.phase(Phase::Settle, |clock: Res<Clock>, mut health: ResMut<Health>| {
+        model.phase(Phase::Remodel, |clock: Res<Clock>, mut health: ResMut<Health>| {
             if clock.hours() > 2.0 {
                 health.report(clock.hours(), "it broke");
             }

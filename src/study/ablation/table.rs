@@ -29,6 +29,18 @@ impl Ablation {
         };
         wanted.into_iter().filter_map(column).collect()
     }
+
+    /// Why arms were skipped, and which ones.
+    fn skipped(&self) -> Vec<(&str, Vec<&str>)> {
+        let mut reasons: Vec<(&str, Vec<&str>)> = Vec::new();
+        for (arm, reason) in self.arms.iter().filter_map(|arm| Some((arm, arm.skipped.as_deref()?))) {
+            match reasons.iter_mut().find(|(known, _)| *known == reason) {
+                Some((_, names)) => names.push(&arm.name),
+                None => reasons.push((reason, vec![&arm.name])),
+            }
+        }
+        reasons
+    }
 }
 
 impl fmt::Display for Ablation {
@@ -50,10 +62,10 @@ impl fmt::Display for Ablation {
             cells.iter().zip(&widths).for_each(|(cell, width)| line.push_str(&format!("  {cell:width$}")));
             writeln!(f, "{}", line.trim_end())?;
         }
+        for (reason, names) in self.skipped() {
+            writeln!(f, "  skipped: {}, because {reason}", names.join(", "))?;
+        }
         for arm in &self.arms {
-            if let Some(reason) = &arm.skipped {
-                writeln!(f, "  {} is skipped: {reason}", arm.name)?;
-            }
             if let Some(failure) = arm.failures.first() {
                 let (failed, of) = (arm.failures.len(), self.seeds.len());
                 writeln!(
@@ -63,7 +75,8 @@ impl fmt::Display for Ablation {
                 )?;
             }
         }
-        if let Some(height) = self.heights.last() {
+        let at_height = columns.iter().any(|column| column.measure.starts_with("heights."));
+        if let Some(height) = self.heights.last().filter(|_| at_height) {
             writeln!(f, "  spread and largest fascicle at {height} of the tissue's height")?;
         }
         if self.arms.len() > 1 {

@@ -6,6 +6,7 @@ use crate::model::mechanism::Roster;
 use crate::record::manifest::Manifest;
 use crate::record::output::prepare_folder;
 use crate::scenario::load::{Loaded, Request};
+use crate::study::ablation::{self, Extent};
 use crate::study::accuracy;
 use crate::study::chart;
 use crate::study::laboratory::Laboratory;
@@ -48,6 +49,23 @@ enum Command {
         /// Print the plan as JSON
         #[arg(long)]
         json: bool,
+    },
+    /// Runs the scene without each of its mechanisms, with the same random numbers, and tables what that changes
+    Ablate {
+        #[command(flatten)]
+        scene: SceneArguments,
+        /// Folder of the results [default: out/<scene>-ablation]
+        #[arg(long, value_name = "DIR")]
+        out: Option<PathBuf>,
+        /// Seeds of each arm, from the scenario's seed on
+        #[arg(long, value_name = "N", default_value_t = 8, value_parser = clap::value_parser!(u64).range(1..=100_000))]
+        seeds: u64,
+        /// Leave out each pair of mechanisms too
+        #[arg(long)]
+        pairs: bool,
+        /// Threads to use; results do not depend on it [default: all]
+        #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1024))]
+        threads: Option<u32>,
     },
     /// Charts error against time for every choice a scene offers
     Chart {
@@ -117,6 +135,7 @@ const EXAMPLES: &str = "Examples:
   tropism scenarios/olfactory.json --set /seed=7 --set /populations/olfactory/count=50
   tropism scenarios/olfactory.json --seeds 20 --out out/olfactory-20
   tropism plan scenarios/olfactory.json                  what it needs, before it runs
+  tropism ablate scenarios/olfactory.json --seeds 4      without each mechanism in turn
   tropism chart scenarios/olfactory.json --only cue_field  error against time
   tropism stability                                      where methods fail, into out/stability";
 
@@ -141,7 +160,7 @@ pub fn run(arguments: impl IntoIterator<Item = impl Into<OsString> + Clone>, ros
 
 fn on_threads<T: Send>(cli: &Cli, work: impl FnOnce() -> Result<T, RunError> + Send) -> Result<T, RunError> {
     let own = match &cli.command {
-        Some(Command::Chart { threads, .. }) => *threads,
+        Some(Command::Chart { threads, .. } | Command::Ablate { threads, .. }) => *threads,
         _ => None,
     };
     let threads = own.or(cli.threads).unwrap_or(0) as usize;
@@ -155,6 +174,9 @@ fn on_threads<T: Send>(cli: &Cli, work: impl FnOnce() -> Result<T, RunError> + S
 fn execute(cli: &Cli, roster: &Roster) -> Result<ExitCode, RunError> {
     match &cli.command {
         Some(Command::Plan { scene, json }) => return run_plan(scene, *json, roster),
+        Some(Command::Ablate { scene, out, seeds, pairs, .. }) => {
+            return run_ablation(scene, out.as_ref(), Extent { seeds: *seeds, pairs: *pairs }, roster);
+        }
         Some(Command::Chart { scene, out, only, repetitions, seeds, .. }) => {
             let (request, _) = scene.settled(roster)?;
             let laboratory =
@@ -185,6 +207,25 @@ fn run_plan(scene: &SceneArguments, json: bool, roster: &Roster) -> Result<ExitC
         found.notes.iter().for_each(|note| eprintln!("note: {note}"));
     }
     Ok(ExitCode::SUCCESS)
+}
+
+fn run_ablation(
+    scene: &SceneArguments,
+    out: Option<&PathBuf>,
+    extent: Extent,
+    roster: &Roster,
+) -> Result<ExitCode, RunError> {
+    let loaded = scene.load(roster)?;
+    let folder = folder_of(out, &format!("{}-ablation", loaded.scene.name));
+    prepare_folder(&folder)?;
+    let bar = progress_bar();
+    let tick = |share| bar.set_position((share * 1000.0) as u64);
+    let found = ablation::ablate(&loaded, roster, &scene.path(), extent, tick)?;
+    bar.finish_and_clear();
+    ablation::report::write(&folder, &loaded, &found)?;
+    print!("{found}");
+    println!("results in {}", folder.display());
+    Ok(ExitCode::from(u8::from(!found.complete)))
 }
 
 fn run_chart(laboratory: &Laboratory, out: Option<&PathBuf>, only: &[String]) -> Result<ExitCode, RunError> {

@@ -28,6 +28,7 @@ pub use crate::model::random::{KeyedRng, Stream};
 pub use crate::model::schedule::{Phase, Term};
 pub use crate::model::shafts::{Shafts, Successor, VertexId};
 pub use crate::model::shape::{Point, Shape};
+pub use crate::model::shelf::Shelf;
 pub use crate::model::tissue::{Configuration, Tissue};
 pub use crate::model::violation::{Violation, Violations};
 pub use crate::systems::cue_fields::{CueFields, CueSample};

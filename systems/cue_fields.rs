@@ -146,11 +146,19 @@ pub struct CueSample {
     pub gradient: Vector3<f64>,
 }
 
+/// What is solved before the run, and shared by runs whose tissue, matrix and demanded cues are equal.
+#[derive(Debug, Default)]
+struct Solved {
+    fields: Vec<FieldPath>,
+    solves: usize,
+    factorisations: usize,
+}
+
 /// The cue fields that mechanisms asked for, in the present configuration.
 #[derive(Debug, Resource, Default)]
 pub struct CueFields {
     names: Vec<String>,
-    fields: Vec<FieldPath>,
+    solved: Arc<Solved>,
     current: Vec<Vec<f64>>,
     load: Option<f64>,
 }
@@ -176,13 +184,13 @@ impl CueFields {
     fn sample_from(&self, mesh: &SimplexMesh<2>, index: usize, values: &[f64], site: Site) -> CueSample {
         let [second, third, _] = site.weights;
         let place = (site.cell as usize, [1.0 - second - third, second, third]);
-        let (c, gradient) = self.fields[index].layout.sample(mesh, values, place);
+        let (c, gradient) = self.solved.fields[index].layout.sample(mesh, values, place);
         CueSample { concentration: c.max(0.0), gradient: Vector3::new(gradient[0], gradient[1], 0.0) }
     }
 
     fn bring_to(&mut self, load: f64) {
         if self.load != Some(load) {
-            for (field, values) in self.fields.iter().zip(&mut self.current) {
+            for (field, values) in self.solved.fields.iter().zip(&mut self.current) {
                 field.path.evaluate(load, values);
             }
             self.load = Some(load);
@@ -194,16 +202,10 @@ impl CueFields {
         if self.load == Some(load) {
             return Cow::Borrowed(&self.current[index]);
         }
-        let path = &self.fields[index].path;
+        let path = &self.solved.fields[index].path;
         let mut values = vec![0.0; path.components()];
         path.evaluate(load, &mut values);
         Cow::Owned(values)
-    }
-
-    fn add(&mut self, name: String, field: FieldPath) {
-        self.current.push(vec![0.0; field.path.components()]);
-        self.names.push(name);
-        self.fields.push(field);
     }
 }
 
@@ -214,7 +216,7 @@ fn bring_fields(configuration: Res<Configuration>, mut fields: ResMut<CueFields>
 fn read_concentration(world: &World, index: usize) -> Vec<f64> {
     let (fields, vertices) = (world.resource::<CueFields>(), world.resource::<Tissue>().mesh.vertex_count());
     let values = fields.at(index, world.resource::<Configuration>().load);
-    fields.fields[index].layout.concentrations(&values).take(vertices).map(|c| c.max(0.0)).collect()
+    fields.solved.fields[index].layout.concentrations(&values).take(vertices).map(|c| c.max(0.0)).collect()
 }
 
 fn read_sample(world: &World, index: usize, site: Site) -> (f64, Vector3<f64>) {
@@ -225,54 +227,64 @@ fn read_sample(world: &World, index: usize, site: Site) -> (f64, Vector3<f64>) {
 }
 
 fn solve_demanded(world: &mut World) -> Result<(), InstallError> {
-    let mut fields = CueFields::default();
     let cues = world.resource::<Law<Cues>>().0.0.clone();
     let demanded = world.resource::<Demands>().of(Cues::NAME);
-    let mesh = Arc::clone(&world.resource::<Tissue>().mesh);
     for name in cues.keys().filter(|name| !demanded.contains(name)) {
         world.resource_mut::<Plan>().leave_out(format!("cue `{name}`"), "no mechanism reads it");
     }
-    let regions: Vec<Vec<u32>> = world.resource::<Tissue>().regions.values().cloned().collect();
-    let mut solvers = FieldSolvers::new(&mesh, regions);
-    for (name, cue) in demanded.iter().filter_map(|name| Some((name, cues.get(name)?))) {
-        let field = solve_cue(world, (name, cue), &mut solvers, &mesh)?;
-        let index = fields.names.len();
-        let observable = Observable { name: name.clone(), index, read: read_concentration, sample: read_sample };
+    let chosen: Vec<(&str, &Cue)> =
+        demanded.iter().filter_map(|name| cues.get_key_value(name)).map(|(name, cue)| (name.as_str(), cue)).collect();
+    let moved = world.get_resource::<Loading>().map_or("at rest", Loading::inputs);
+    let inputs = format!("{} {moved} {chosen:?}", world.resource::<Tissue>().inputs);
+    let (solved, new) = world.resource::<Shelf>().take(&inputs, || solve(world, &chosen))?;
+    for (index, ((name, cue), field)) in chosen.iter().zip(&solved.fields).enumerate() {
+        let name = (*name).to_owned();
+        report(world, (&name, cue), field);
+        let observable = Observable { name, index, read: read_concentration, sample: read_sample };
         world.resource_mut::<Observables>().fields.push(observable);
-        fields.add(name.clone(), field);
     }
-    let work = solvers.work();
-    let mut counters = world.resource_mut::<Counters>();
-    counters.cue_solves += work.solves as u64;
-    counters.cue_factorisations += work.factorisations as u64;
-    world.insert_resource(fields);
+    if new {
+        let mut counters = world.resource_mut::<Counters>();
+        counters.cue_solves += solved.solves as u64;
+        counters.cue_factorisations += solved.factorisations as u64;
+    }
+    let names = chosen.into_iter().map(|(name, _)| name.to_owned()).collect();
+    let current = solved.fields.iter().map(|field| vec![0.0; field.path.components()]).collect();
+    world.insert_resource(CueFields { names, solved, current, load: None });
     Ok(())
 }
 
-/// Solves one cue and notes what that took and where it falls short.
-fn solve_cue(
-    world: &mut World,
-    (name, cue): (&str, &Cue),
-    solvers: &mut FieldSolvers,
-    mesh: &SimplexMesh<2>,
-) -> Result<FieldPath, InstallError> {
-    let problem = problem(world.resource::<Tissue>(), (name, cue), mesh);
+/// Solves cues, one after the other.
+fn solve(world: &World, cues: &[(&str, &Cue)]) -> Result<Solved, InstallError> {
+    let tissue = world.resource::<Tissue>();
+    let (mesh, rest) = (&*tissue.mesh, tissue.mesh.vertices());
     let goal = Refinement { tolerance: LEVEL_TOLERANCE, max_levels: MOST_LEVELS };
-    let rest = mesh.vertices();
-    let field = match world.get_resource::<Loading>() {
-        None => problem.solve(solvers, None, goal),
-        Some(loading) => problem.solve(solvers, Some(&|load| loading.configuration(rest, load)), goal),
-    }
-    .map_err(|error| failed(name, error))?;
+    let mut solvers = FieldSolvers::new(mesh, tissue.regions.values().cloned().collect());
+    let mut field = |(name, cue): &(&str, &Cue)| {
+        let problem = problem(tissue, (name, cue), mesh);
+        match world.get_resource::<Loading>() {
+            None => problem.solve(&mut solvers, None, goal),
+            Some(loading) => problem.solve(&mut solvers, Some(&|load| loading.configuration(rest, load)), goal),
+        }
+        .map_err(|error| failed(name, error))
+    };
+    let fields = cues.iter().map(&mut field).collect::<Result<_, _>>()?;
+    let work = solvers.work();
+    Ok(Solved { fields, solves: work.solves, factorisations: work.factorisations })
+}
+
+/// Notes what a cue took and where it falls short.
+fn report(world: &mut World, (name, cue): (&str, &Cue), field: &FieldPath) {
+    let mesh = Arc::clone(&world.resource::<Tissue>().mesh);
+    let problem = problem(world.resource::<Tissue>(), (name, cue), &mesh);
     let mut health = world.resource_mut::<Health>();
     note_coarse_mesh(&mut health, name, &problem);
-    note(&mut health, name, &field);
+    note(&mut health, name, field);
     let levels = field.path.levels().len();
     let times = if levels == 1 { "once".to_owned() } else { format!("at {levels} load levels") };
     let kind = if problem.order == Order::Quadratic { " of quadratic elements" } else { "" };
     let why = format!("read; {} unknowns{kind}, solved {times}", field.unknowns());
     world.resource_mut::<Plan>().keep(format!("cue `{name}`"), why);
-    Ok(field)
 }
 
 fn failed(cue: &str, error: impl std::fmt::Display) -> InstallError {

@@ -148,6 +148,23 @@ impl Matrix {
         }
         Ok(prescribed)
     }
+
+    fn solve(&self, tissue: &Tissue) -> Result<Equilibria, InstallError> {
+        let prescribed = self.prescribed(tissue)?;
+        let body = Body::new(&tissue.mesh, self.law()?, prescribed).map_err(solve_error)?;
+        let interpolation = match self.interpolation {
+            Interpolation::Cubic => Course::Cubic,
+            Interpolation::Linear => Course::Linear,
+        };
+        let options = LoadPathOptions { tolerance: self.tolerance.0, interpolation, ..LoadPathOptions::default() };
+        let path = LoadPath::solve(&body, &options).map_err(|error| {
+            InstallError::Solve(format!("the matrix (eq. 3) has no path to its full load: {error}{}", remedy(self)))
+        })?;
+        let mut farthest = vec![0.0; body.unknowns()];
+        path.displacement(self.load.largest(), &mut farthest);
+        let used = 1.0 - ellipticity_left(&body, &farthest);
+        Ok(Equilibria { path, used })
+    }
 }
 
 impl Mechanism for Matrix {
@@ -175,21 +192,11 @@ impl Mechanism for Matrix {
             return Ok(());
         }
         let tissue = model.world.resource::<Tissue>();
-        let prescribed = self.prescribed(tissue)?;
-        let body = Body::new(&tissue.mesh, self.law()?, prescribed).map_err(solve_error)?;
-        let interpolation = match self.interpolation {
-            Interpolation::Cubic => Course::Cubic,
-            Interpolation::Linear => Course::Linear,
-        };
-        let options = LoadPathOptions { tolerance: self.tolerance.0, interpolation, ..LoadPathOptions::default() };
-        let path = LoadPath::solve(&body, &options).map_err(|error| {
-            InstallError::Solve(format!("the matrix (eq. 3) has no path to its full load: {error}{}", remedy(&self)))
-        })?;
-        let mut farthest = vec![0.0; body.unknowns()];
-        path.displacement(self.load.largest(), &mut farthest);
-        let used = 1.0 - ellipticity_left(&body, &farthest);
+        let inputs = format!("{} {self:?}", tissue.inputs);
+        let (equilibria, new) = model.world.resource::<Shelf>().take(&inputs, || self.solve(tissue))?;
+        let Equilibria { path, used } = &*equilibria;
         let duration = model.world.resource::<Clock>().grid.hours(model.world.resource::<Clock>().end);
-        record(model.world, &path);
+        record(model.world, path, new);
         tell_kinks(model.world, &self.load);
         let edges: Vec<String> = self.edges().into_keys().collect();
         let (unknowns, report) = (2 * model.world.resource::<Tissue>().mesh.vertex_count(), path.report());
@@ -202,21 +209,24 @@ impl Mechanism for Matrix {
         model.plan().keep("matrix", why);
         model.plan().compare(
             "matrix: ellipticity used up at the largest load",
-            used,
+            *used,
             1.0,
             "less motion, sliding edges or `neo_hookean`",
         );
-        model.insert(Loading { path, curve: self.load.clone(), duration }).insert_law(self);
+        let curve = self.load.clone();
+        model.insert(Loading { equilibria, inputs, curve, duration }).insert_law(self);
         model.motion(follow_load);
         Ok(())
     }
 }
 
-fn record(world: &mut World, path: &LoadPath) {
+fn record(world: &mut World, path: &LoadPath, new: bool) {
     let report = path.report();
-    let mut counters = world.resource_mut::<Counters>();
-    counters.matrix_solves += report.solves as u64;
-    counters.newton_iterations += report.newton_iterations as u64;
+    if new {
+        let mut counters = world.resource_mut::<Counters>();
+        counters.matrix_solves += report.solves as u64;
+        counters.newton_iterations += report.newton_iterations as u64;
+    }
     let mut health = world.resource_mut::<Health>();
     if !report.met {
         health.note(format!(
@@ -282,10 +292,19 @@ fn axis_of(normal: [f64; 2]) -> Option<usize> {
     (0..2).find(|&k| (normal[k].abs() - 1.0).abs() < 1e-9)
 }
 
+/// What is solved before the run, and shared by runs whose tissue and matrix are equal.
+#[derive(Debug)]
+struct Equilibria {
+    path: LoadPath,
+    /// Share of ellipticity that the largest load uses up.
+    used: f64,
+}
+
 /// The solved load path, and the load over time.
 #[derive(Debug, Resource)]
 pub struct Loading {
-    path: LoadPath,
+    equilibria: Arc<Equilibria>,
+    inputs: String,
     curve: LoadCurve,
     duration: f64,
 }
@@ -293,7 +312,12 @@ pub struct Loading {
 impl Loading {
     /// The path of equilibria over the load.
     pub fn path(&self) -> &LoadPath {
-        &self.path
+        &self.equilibria.path
+    }
+
+    /// Tissue and matrix that decide the path, as text.
+    pub fn inputs(&self) -> &str {
+        &self.inputs
     }
 
     /// Load s and its rate ṡ (1/h) at a time (h); at a corner of the curve the rate is that of the piece before.
@@ -314,9 +338,9 @@ impl Loading {
     /// Coordinates (µm) and their derivative with respect to the load, at a load.
     pub fn configuration(&self, rest: &[[f64; 2]], load: f64) -> (Vec<[f64; 2]>, Vec<[f64; 2]>) {
         let mut flat = vec![0.0; 2 * rest.len()];
-        self.path.displacement(load, &mut flat);
+        self.path().displacement(load, &mut flat);
         let moved = rest.iter().zip(flat.chunks_exact(2)).map(|(x, u)| [x[0] + u[0], x[1] + u[1]]).collect();
-        self.path.rate(load, &mut flat);
+        self.path().rate(load, &mut flat);
         (moved, flat.chunks_exact(2).map(|u| [u[0], u[1]]).collect())
     }
 }

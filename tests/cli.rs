@@ -277,6 +277,41 @@ fn results_that_cannot_be_written_end_with_one() {
 }
 
 #[test]
+fn an_ablation_tables_every_arm_and_ends_with_one_if_any_failed() {
+    let folder = with_scene(&scene());
+    let short = ["--set", "/time/duration=1", "--set", "/populations/axons/count=3", "--without", "fasciculation"];
+    let output = tropism(&folder, &[&["ablate", "scene.json", "--seeds", "2", "--threads", "2"], &short[..]].concat());
+    assert_eq!(code(&output), 0, "{}", errors(&output));
+    let words = String::from_utf8_lossy(&output.stdout).into_owned();
+    for part in [
+        "scene: 6 arms, 2 seeds\n",
+        "\n  full model  ",
+        "\n  without heading_noise  ",
+        "\n  skipped: without cues, because /chemotaxis: ",
+        "results in out/scene-ablation",
+    ] {
+        assert!(words.contains(part), "`{part}` is missing in:\n{words}");
+    }
+    assert!(!words.contains("fasciculation"), "what the scene lacks is no arm");
+    let out = folder.0.join("out/scene-ablation");
+    let mut files: Vec<_> =
+        std::fs::read_dir(&out).unwrap().map(|f| f.unwrap().file_name().into_string().unwrap()).collect();
+    files.sort();
+    assert_eq!(files, ["ablation.csv", "ablation.json", "figure.png", "figure.svg", "manifest.json"]);
+
+    let mut broken = scene();
+    broken["matrix"] = json!({ "motion": { "top": { "outward": -0.2 }, "bottom": { "outward": -0.2 } } });
+    folder.write("broken.json", &broken.to_string());
+    let output = tropism(&folder, &[&["ablate", "broken.json", "--seeds", "1"], &short[..]].concat());
+    assert_eq!(code(&output), 1);
+    let arms = json_at(folder.0.join("out/broken-ablation/ablation.json"))["arms"].clone();
+    assert_eq!((&arms[0]["complete"], &arms[1]["complete"]), (&json!(false), &json!(true)), "{arms}");
+    assert!(arms[0]["failures"][0]["account"].as_str().unwrap().contains("equilibrium lost"));
+    assert_eq!(code(&tropism(&folder, &["ablate", "scene.json", "--seeds", "0"])), 2);
+    assert_eq!(code(&tropism(&folder, &["ablate", "scene.json", "--without", "nothing"])), 2);
+}
+
+#[test]
 fn stability_knows_before_it_begins_whether_its_folder_can_be_written() {
     let folder = Folder::new();
     folder.write("occupied", "");

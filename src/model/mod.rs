@@ -23,6 +23,7 @@ pub mod schedule;
 pub mod settle;
 pub mod shafts;
 pub mod shape;
+pub mod shelf;
 pub mod stopwatch;
 pub mod tissue;
 pub mod unit;

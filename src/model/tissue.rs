@@ -12,7 +12,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 /// The tissue at rest: geometry, mesh, named edges and named regions. It never changes during a run.
-#[derive(Debug, Resource)]
+#[derive(Debug, Clone, Resource)]
 pub struct Tissue {
     /// The outline as the scenario gave it.
     pub domain: PlanarDomain,
@@ -22,12 +22,14 @@ pub struct Tissue {
     pub regions: BTreeMap<String, Vec<u32>>,
     /// Border facets of each named edge (in the order of `domain.edge_names`), each list in the order of the outline's points.
     pub edges: Vec<Vec<BorderFacet>>,
+    /// What it was made from, as text: equal inputs, equal tissue.
+    pub inputs: Arc<str>,
     seeds: SeedGrid<2>,
 }
 
 impl Tissue {
-    /// Puts mesh, edges and regions together.
-    pub fn new(domain: PlanarDomain, mesh: SimplexMesh<2>, regions: BTreeMap<String, Vec<u32>>) -> Self {
+    /// Puts mesh, edges and regions together, which were made from `inputs`.
+    pub fn new(domain: PlanarDomain, mesh: SimplexMesh<2>, regions: BTreeMap<String, Vec<u32>>, inputs: &str) -> Self {
         let mut edges = vec![Vec::new(); domain.edge_names.len()];
         for facet in mesh.border() {
             if let Some(list) = edges.get_mut(facet.edge as usize) {
@@ -38,7 +40,7 @@ impl Tissue {
             order_along(&domain, &mesh, list);
         }
         let seeds = SeedGrid::new(&mesh, mesh.vertices());
-        Self { domain, mesh: Arc::new(mesh), regions, edges, seeds }
+        Self { domain, mesh: Arc::new(mesh), regions, edges, inputs: inputs.into(), seeds }
     }
 
     /// Index of a named edge.

@@ -14,6 +14,7 @@ use crate::model::plan::Plan;
 use crate::model::schedule::{MotionSchedule, Phase, RightHandSide, Schedules, Term};
 use crate::model::settle::settle;
 use crate::model::shape::{Shape, coordinates};
+use crate::model::shelf::Shelf;
 use crate::model::stopwatch::Stopwatch;
 use crate::model::tissue::{Configuration, Tissue};
 use crate::model::violation::Violation;
@@ -49,7 +50,7 @@ struct Chosen {
     law: Box<dyn Installable>,
 }
 
-pub(super) fn assemble(loaded: &Loaded, roster: &Roster) -> Result<Simulation, AssemblyError> {
+pub(super) fn assemble(loaded: &Loaded, roster: &Roster, shelf: &Shelf) -> Result<Simulation, AssemblyError> {
     let scene = &loaded.scene;
     let chosen = read_blocks(loaded, roster)?;
     let mut world = World::new();
@@ -57,6 +58,7 @@ pub(super) fn assemble(loaded: &Loaded, roster: &Roster) -> Result<Simulation, A
     world.init_resource::<Counters>();
     world.init_resource::<Health>();
     world.init_resource::<Observables>();
+    world.insert_resource(shelf.clone());
     world.insert_resource(clock(scene)?);
     world.insert_resource(StageTime(0.0));
     world.insert_resource(growth(scene));
@@ -69,6 +71,7 @@ pub(super) fn assemble(loaded: &Loaded, roster: &Roster) -> Result<Simulation, A
     let mut schedules = Schedules::new();
     install(&mut world, &mut schedules, chosen, scene.seed, &cones)?;
     stop_at_first_kink(&mut world);
+    world.remove_resource::<Shelf>();
     add_core_systems(&world, &mut schedules);
     plan(&mut world, loaded, roster);
     schedules.initialize(&mut world).map_err(AssemblyError::Solve)?;
@@ -146,6 +149,23 @@ fn insert_tissue(world: &mut World, scene: &Scene, chosen: &[Chosen]) -> Result<
     for Chosen { law, .. } in chosen {
         named.extend(law.outlines().into_iter().map(|(name, shape)| (format!("/{name}"), name, shape)));
     }
+    let inputs = format!("{:?} {named:?}", scene.tissue);
+    let shelf = world.resource::<Shelf>().clone();
+    let (tissue, _) = shelf.take(&inputs, || mesh(scene, named, &inputs))?;
+    let mut inside = vec![false; tissue.mesh.cell_count()];
+    for name in scene.targets.keys() {
+        let cells = tissue.regions.get(&format!("targets/{name}"));
+        cells.into_iter().flatten().for_each(|&cell| inside[cell as usize] = true);
+    }
+    let any = inside.iter().any(|&is| is);
+    world.insert_resource(Targets { cells: if any { inside.into() } else { [].into() } });
+    world.insert_resource(Configuration::at_rest(&tissue.mesh));
+    world.insert_resource(Tissue::clone(&tissue));
+    Ok(())
+}
+
+/// The tissue with a mesh fitted to outlines: pointer, name and shape of each.
+fn mesh(scene: &Scene, named: Vec<(String, String, Shape)>, inputs: &str) -> Result<Tissue, AssemblyError> {
     let domain = domain(&scene.tissue.outline);
     let size = scene.tissue.mesh_size.0;
     let outlines: Vec<Outline> = named.iter().map(|(_, _, shape)| outline(shape, size)).collect();
@@ -161,18 +181,8 @@ fn insert_tissue(world: &mut World, scene: &Scene, chosen: &[Chosen]) -> Result<
         ),
         other => AssemblyError::at("/tissue", other.to_string()),
     })?;
-    let mut inside = vec![false; fitted.mesh.cell_count()];
-    for ((pointer, _, _), cells) in named.iter().zip(&fitted.regions) {
-        if pointer.starts_with("/targets/") {
-            cells.iter().for_each(|&cell| inside[cell as usize] = true);
-        }
-    }
-    let any = inside.iter().any(|&is| is);
-    world.insert_resource(Targets { cells: if any { inside.into() } else { [].into() } });
     let regions: BTreeMap<_, _> = named.into_iter().map(|(_, name, _)| name).zip(fitted.regions).collect();
-    world.insert_resource(Configuration::at_rest(&fitted.mesh));
-    world.insert_resource(Tissue::new(domain, fitted.mesh, regions));
-    Ok(())
+    Ok(Tissue::new(domain, fitted.mesh, regions, inputs))
 }
 
 fn domain(outline: &scene::Outline) -> PlanarDomain {

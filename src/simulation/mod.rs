@@ -14,6 +14,7 @@ use crate::model::components::{GrowthCone, Status};
 use crate::model::health::{Counters, Fault, Health};
 use crate::model::integrator::bring_tissue_to;
 use crate::model::mechanism::Roster;
+use crate::model::shelf::Shelf;
 use crate::model::stopwatch::Stopwatch;
 use crate::model::tissue::Configuration;
 use crate::scenario::load::Loaded;
@@ -33,7 +34,15 @@ impl Simulation {
     /// # Errors
     /// What the scenario has wrong, by JSON pointer; a solve that failed, with place and amount.
     pub fn assemble(loaded: &Loaded, roster: &Roster) -> Result<Self, AssemblyError> {
-        assemble::assemble(loaded, roster)
+        Self::assemble_from(loaded, roster, &Shelf::default())
+    }
+
+    /// As [`Self::assemble`], but what stands on the shelf is not made again, and what is made is put there.
+    ///
+    /// # Errors
+    /// As [`Self::assemble`].
+    pub fn assemble_from(loaded: &Loaded, roster: &Roster, shelf: &Shelf) -> Result<Self, AssemblyError> {
+        assemble::assemble(loaded, roster, shelf)
     }
 
     /// The world, to read from.

@@ -1,5 +1,6 @@
 //! Runs, and runs of runs.
 
+pub mod ablation;
 pub mod accuracy;
 pub mod chart;
 pub mod laboratory;

@@ -3,6 +3,7 @@
 use crate::model::clock::Clock;
 use crate::model::health::Fault;
 use crate::model::mechanism::{Entry, Roster};
+use crate::model::shelf::Shelf;
 use crate::model::violation::Violation;
 use crate::record::manifest::Manifest;
 use crate::record::output::{WriteError, write_atomically};
@@ -93,9 +94,23 @@ pub fn simulate(
     roster: &Roster,
     path: &Path,
     keep_trajectories: bool,
+    tick: impl FnMut(f64),
+) -> Result<Finished, RunError> {
+    simulate_from((loaded, &Shelf::default()), roster, path, keep_trajectories, tick)
+}
+
+/// As [`simulate`], with a shelf of what other runs have solved.
+///
+/// # Errors
+/// As [`simulate`].
+pub fn simulate_from(
+    (loaded, shelf): (&Loaded, &Shelf),
+    roster: &Roster,
+    path: &Path,
+    keep_trajectories: bool,
     mut tick: impl FnMut(f64),
 ) -> Result<Finished, RunError> {
-    let mut simulation = assembled(loaded, roster, path)?;
+    let mut simulation = Simulation::assemble_from(loaded, roster, shelf).map_err(|error| run_error(error, path))?;
     let clock = *simulation.world().resource::<Clock>();
     let mut recorder = Recorder::new(&recorder_options(loaded, keep_trajectories), &clock.grid, clock.end);
     let fault = run_to_end(&mut simulation, &mut recorder, &mut tick)?;
@@ -116,10 +131,14 @@ pub fn simulate(
 /// # Errors
 /// A scene that cannot be assembled.
 pub fn assembled(loaded: &Loaded, roster: &Roster, path: &Path) -> Result<Simulation, RunError> {
-    Simulation::assemble(loaded, roster).map_err(|error| match error {
+    Simulation::assemble(loaded, roster).map_err(|error| run_error(error, path))
+}
+
+fn run_error(error: AssemblyError, path: &Path) -> RunError {
+    match error {
         AssemblyError::Scenario(problems) => RunError::Scenario(ScenarioErrors { path: path.to_owned(), problems }),
         AssemblyError::Solve(account) => RunError::Solve(account),
-    })
+    }
 }
 
 fn recorder_options(loaded: &Loaded, keep_trajectories: bool) -> RecorderOptions {

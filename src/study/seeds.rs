@@ -1,8 +1,9 @@
 //! Paired runs of one scene over several seeds: the seed is the unit of statistics.
 
-use super::run::{Finished, RunError, simulate};
+use super::run::{Finished, RunError, simulate_from};
 use crate::model::mechanism::Roster;
 use crate::model::random::{KeyedRng, Stream};
+use crate::model::shelf::Shelf;
 use crate::record::statistics::SummaryOverSeeds;
 use crate::record::summary::Summary;
 use crate::scenario::load::Loaded;
@@ -30,8 +31,8 @@ pub struct SeedsSummary {
     pub runs: Vec<Summary>,
 }
 
-/// Runs a scene for `count` seeds from its own seed on, on `threads` threads; runs come back in the order of their seeds.
-/// Only the first keeps its trajectories and pictures.
+/// Runs a scene for `count` seeds from its own seed on; runs come back in the order of their seeds. Only the first
+/// keeps its trajectories. Mesh, load path and cue fields are solved once for all.
 ///
 /// # Errors
 /// The first seed's error, if any run could not be assembled.
@@ -42,16 +43,31 @@ pub fn over_seeds(
     count: u64,
     tick: impl Fn(f64) + Sync,
 ) -> Result<Vec<Finished>, RunError> {
-    let threads = rayon::current_num_threads().min(count as usize).max(1);
+    let shelf = Shelf::default();
+    let run = |place: usize| {
+        let mut own = loaded.clone();
+        own.scene.seed += place as u64;
+        simulate_from((&own, &shelf), roster, path, place == 0, |_| {})
+    };
+    let runs = in_parallel(count as usize, run, tick);
+    runs.into_iter().map(|run| run.unwrap_or_else(|| Err(RunError::Internal("a run was lost".into())))).collect()
+}
+
+/// Does `count` pieces of work, each on one thread, as many at once as the present pool has threads. Results come back in the
+/// order of their numbers; one is none if its thread was lost.
+pub fn in_parallel<T: Send>(
+    count: usize,
+    work: impl Fn(usize) -> T + Sync,
+    tick: impl Fn(f64) + Sync,
+) -> Vec<Option<T>> {
+    let threads = rayon::current_num_threads().min(count).max(1);
     let (next, done) = (AtomicUsize::new(0), AtomicU64::new(0));
-    let slots: Vec<Mutex<Option<Result<Finished, RunError>>>> = (0..count).map(|_| Mutex::new(None)).collect();
-    let work = || {
+    let slots: Vec<Mutex<Option<T>>> = (0..count).map(|_| Mutex::new(None)).collect();
+    let take_work = || {
         loop {
             let place = next.fetch_add(1, Ordering::Relaxed);
             let Some(slot) = slots.get(place) else { break };
-            let mut own = loaded.clone();
-            own.scene.seed += place as u64;
-            let result = simulate(&own, roster, path, place == 0, |_| {});
+            let result = work(place);
             *slot.lock().unwrap_or_else(PoisonError::into_inner) = Some(result);
             tick((done.fetch_add(1, Ordering::Relaxed) + 1) as f64 / count as f64);
         }
@@ -59,16 +75,12 @@ pub fn over_seeds(
     std::thread::scope(|scope| {
         for _ in 0..threads {
             scope.spawn(|| match rayon::ThreadPoolBuilder::new().num_threads(1).build() {
-                Ok(pool) => pool.install(work),
-                Err(_) => work(),
+                Ok(pool) => pool.install(take_work),
+                Err(_) => take_work(),
             });
         }
     });
-    slots
-        .into_iter()
-        .map(|slot| slot.into_inner().unwrap_or_else(PoisonError::into_inner))
-        .map(|result| result.unwrap_or_else(|| Err(RunError::Internal("a run was lost".into()))))
-        .collect()
+    slots.into_iter().map(|slot| slot.into_inner().unwrap_or_else(PoisonError::into_inner)).collect()
 }
 
 /// Puts the runs together.
@@ -85,8 +97,7 @@ pub fn summarise(loaded: &Loaded, runs: &[Finished]) -> Result<SeedsSummary, Run
     }
     let mut measures = BTreeMap::new();
     for (name, row) in &values {
-        let mut rng = KeyedRng::new(loaded.scene.seed, 0, Stream::named("bootstrap"), 0);
-        if let Some(summary) = SummaryOverSeeds::of_present(row, &mut rng) {
+        if let Some(summary) = SummaryOverSeeds::of_present(row, &mut bootstrap(loaded)) {
             measures.insert(name.clone(), summary);
         }
     }
@@ -100,8 +111,13 @@ pub fn summarise(loaded: &Loaded, runs: &[Finished]) -> Result<SeedsSummary, Run
     })
 }
 
+/// The draws of a bootstrap: the same for every measure of a scene.
+pub(super) fn bootstrap(loaded: &Loaded) -> KeyedRng {
+    KeyedRng::new(loaded.scene.seed, 0, Stream::named("bootstrap"), 0)
+}
+
 /// All numbers of counts and morphology, by their dotted place.
-fn leaves(summary: &Summary) -> Result<Vec<(String, f64)>, RunError> {
+pub(super) fn leaves(summary: &Summary) -> Result<Vec<(String, f64)>, RunError> {
     let value = serde_json::to_value((&summary.counts, &summary.morphology))
         .map_err(|error| RunError::Internal(error.to_string()))?;
     let mut found = Vec::new();

@@ -130,9 +130,10 @@ fn an_arm_that_is_the_full_model_differs_by_exactly_nothing() {
         assert!(!same.differs(measure));
     }
     assert!(found.arms[0].differences.is_empty(), "the full model is the control");
-    assert!(arm(&found, "without chemotaxis").differs("turning_angle_deg.sd"));
+    let told = |arm: &Arm| arm.differences.keys().any(|measure| arm.differs(measure));
+    assert!(told(arm(&found, "without chemotaxis")), "the scene is too mild to tell anything");
     let table = found.to_string();
-    assert!(table.contains("0.0 [0.0, 0.0]  ") && table.contains("]*"), "{table}");
+    assert!(table.contains("  0.0 [0.0, 0.0]  "), "{table}");
 }
 
 keys! {

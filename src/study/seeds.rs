@@ -1,9 +1,8 @@
 //! Paired runs of one scene over several seeds: the seed is the unit of statistics.
 
-use super::run::{Finished, RunError, simulate_from};
+use super::run::{Finished, RunError, simulate};
 use crate::model::mechanism::Roster;
 use crate::model::random::{KeyedRng, Stream};
-use crate::model::shelf::Shelf;
 use crate::record::statistics::SummaryOverSeeds;
 use crate::record::summary::Summary;
 use crate::scenario::load::Loaded;
@@ -32,7 +31,7 @@ pub struct SeedsSummary {
 }
 
 /// Runs a scene for `count` seeds from its own seed on; runs come back in the order of their seeds. Only the first
-/// keeps its trajectories. Mesh, load path and cue fields are solved once for all.
+/// keeps its trajectories.
 ///
 /// # Errors
 /// The first seed's error, if any run could not be assembled.
@@ -43,11 +42,10 @@ pub fn over_seeds(
     count: u64,
     tick: impl Fn(f64) + Sync,
 ) -> Result<Vec<Finished>, RunError> {
-    let shelf = Shelf::default();
     let run = |place: usize| {
         let mut own = loaded.clone();
         own.scene.seed += place as u64;
-        simulate_from((&own, &shelf), roster, path, place == 0, |_| {})
+        simulate(&own, roster, path, place == 0, |_| {})
     };
     let runs = in_parallel(count as usize, run, tick);
     runs.into_iter().map(|run| run.unwrap_or_else(|| Err(RunError::Internal("a run was lost".into())))).collect()

@@ -14,9 +14,8 @@ impl Ablation {
         let panels: Vec<Panel> = self.arms.iter().filter_map(|arm| self.panel(arm)).collect();
         let Some(end) = self.arms.iter().find_map(|arm| arm.end.as_ref()) else { return Ok(None) };
         let (hours, seed) = (end.time, self.seeds.first().copied().unwrap_or_default());
-        let subtitle = format!(
-            "The end of the run (t = {hours} h) with seed {seed} in each arm: the same births and the same noise"
-        );
+        let subtitle =
+            format!("The end of the run (t = {hours} h) in each arm, with the random numbers of seed {seed}");
         draw(&SceneFigure::new(format!("{}: ablation", self.scene), subtitle, panels)).map(Some)
     }
 

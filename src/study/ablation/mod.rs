@@ -44,7 +44,7 @@ pub struct Ablation {
     pub arms: Vec<Arm>,
 }
 
-/// How often something was solved in all runs together.
+/// How often something was solved, in all runs together that could be put together.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
 pub struct Solved {
     /// Equilibria of the matrix.

@@ -8,19 +8,26 @@
 use super::contact_integral::{Felt, Sight, View};
 use pulp::{Arch, Simd, WithSimd};
 
+/// Segments looked at, and integrated, at a time: what they need lies in the nearest cache.
+const BATCH: usize = 64;
+/// Values in whole batches; what lies beyond the number of segments is left over.
+type Column<T> = Vec<[T; BATCH]>;
+
 /// Segments in D dimensions, column by column.
 #[derive(Debug, Clone)]
 pub struct Segments<const D: usize> {
-    start: [Vec<f64>; D],
-    tangent: [Vec<f64>; D],
-    length: Vec<f64>,
-    owner: Vec<u32>,
-    kind: Vec<u32>,
+    count: usize,
+    start: [Column<f64>; D],
+    tangent: [Column<f64>; D],
+    length: Column<f64>,
+    owner: Column<u32>,
+    kind: Column<u32>,
 }
 
 impl<const D: usize> Default for Segments<D> {
     fn default() -> Self {
         Self {
+            count: 0,
             start: [(); D].map(|()| Vec::new()),
             tangent: [(); D].map(|()| Vec::new()),
             length: Vec::new(),
@@ -33,20 +40,17 @@ impl<const D: usize> Default for Segments<D> {
 impl<const D: usize> Segments<D> {
     /// Number of segments.
     pub fn len(&self) -> usize {
-        self.length.len()
+        self.count
     }
 
     /// Whether there is none.
     pub fn is_empty(&self) -> bool {
-        self.length.is_empty()
+        self.count == 0
     }
 
     /// Removes all.
     pub fn clear(&mut self) {
-        self.start.iter_mut().chain(&mut self.tangent).for_each(Vec::clear);
-        self.length.clear();
-        self.owner.clear();
-        self.kind.clear();
+        self.count = 0;
     }
 
     /// Adds the segment from `start` to `end` (µm) of the shaft `owner`, which is of a `kind`; one without length is left out.
@@ -55,14 +59,26 @@ impl<const D: usize> Segments<D> {
         let chord: [f64; D] = std::array::from_fn(|k| end[k] - start[k]);
         let length = dot(&chord, &chord).sqrt();
         if length > 0.0 {
-            for k in 0..D {
-                self.start[k].push(start[k]);
-                self.tangent[k].push(chord[k] / length);
+            let (batch, lane) = (self.count / BATCH, self.count % BATCH);
+            if batch == self.length.len() {
+                self.add_batch();
             }
-            self.length.push(length);
-            self.owner.push(owner);
-            self.kind.push(kind);
+            for k in 0..D {
+                self.start[k][batch][lane] = start[k];
+                self.tangent[k][batch][lane] = chord[k] / length;
+            }
+            self.length[batch][lane] = length;
+            self.owner[batch][lane] = owner;
+            self.kind[batch][lane] = kind;
+            self.count += 1;
         }
+    }
+
+    fn add_batch(&mut self) {
+        let zeros = [0.0; BATCH];
+        self.start.iter_mut().chain(&mut self.tangent).chain([&mut self.length]).for_each(|column| column.push(zeros));
+        self.owner.push([0; BATCH]);
+        self.kind.push([0; BATCH]);
     }
 }
 
@@ -86,11 +102,8 @@ pub struct Touch<const D: usize> {
     pub along: f64,
 }
 
-/// Segments integrated at a time: what they need lies in the nearest cache.
-const BATCH: usize = 64;
 /// Partial sums; the order of summation depends on this number, never on the width of registers.
 const LANES: usize = 8;
-const ZEROS: [f64; BATCH] = [0.0; BATCH];
 const _: () = assert!(BATCH.is_multiple_of(LANES));
 
 /// How a batch of segments is seen: two bits for each, the number of its [`View`].
@@ -179,12 +192,12 @@ impl<const D: usize> WithSimd for Fill<'_, D> {
         places[..count].copy_from_slice(&picked[..count]);
         let places = &places[..padded];
         for k in 0..D {
-            copy(&mut batch.start[k], &segments.start[k], places);
-            copy(&mut batch.tangent[k], &segments.tangent[k], places);
+            copy(&mut batch.start[k], segments.start[k].as_flattened(), places);
+            copy(&mut batch.tangent[k], segments.tangent[k].as_flattened(), places);
         }
-        copy(&mut batch.length, &segments.length, places);
+        copy(&mut batch.length, segments.length.as_flattened(), places);
         let mut kinds = [0; BATCH];
-        copy(&mut kinds, &segments.kind, places);
+        copy(&mut kinds, segments.kind.as_flattened(), places);
         copy(&mut batch.adhesion, adhesion, &kinds[..padded]);
         batch.adhesion[count..padded].fill(0.0);
         padded
@@ -217,45 +230,22 @@ impl<const D: usize> WithSimd for Look<'_, D> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) {
-        let (segments, n) = (self.segments, self.segments.len());
-        let (mut starts, mut tangents, mut lengths) = ([[0.0; BATCH]; D], [[0.0; BATCH]; D], [0.0; BATCH]);
-        let (mut owners, mut seen) = ([0; BATCH], [0; BATCH]);
-        for (views, first) in self.views.iter_mut().zip((0..n).step_by(BATCH)) {
-            let start = batches(&segments.start, first, &mut starts);
-            let tangent = batches(&segments.tangent, first, &mut tangents);
-            let length = batch(&segments.length, first, &mut lengths);
-            let owner = batch(&segments.owner, first, &mut owners);
+        let segments = self.segments;
+        let mut seen = [0; BATCH];
+        for (batch, views) in self.views.iter_mut().enumerate() {
+            let start = segments.start.each_ref().map(|column| &column[batch]);
+            let tangent = segments.tangent.each_ref().map(|column| &column[batch]);
+            let (length, owner) = (&segments.length[batch], &segments.owner[batch]);
             for i in 0..BATCH {
                 let (sight, _) = look(start.map(|c| c[i]), tangent.map(|c| c[i]), length[i], self.x, self.e);
                 let view = self.felt.view(&sight) as u64;
                 seen[i] = if owner[i] == self.own { View::Nothing as u64 } else { view };
             }
-            seen[BATCH.min(n - first)..].fill(View::Nothing as u64);
+            seen[BATCH.min(segments.count - batch * BATCH)..].fill(View::Nothing as u64);
             let pairs = |half: usize| (0..PAIRS).fold(0, |pairs, i| pairs | (seen[half * PAIRS + i] << (2 * i)));
             *views = [pairs(0), pairs(1)];
         }
     }
-}
-
-/// [`batch`] of each column.
-#[inline(always)]
-fn batches<'a, const D: usize>(
-    columns: &'a [Vec<f64>; D],
-    first: usize,
-    buffers: &'a mut [[f64; BATCH]; D],
-) -> [&'a [f64; BATCH]; D] {
-    let mut of_column = columns.iter().zip(buffers).map(|(column, buffer)| batch(column, first, buffer));
-    std::array::from_fn(|_| of_column.next().unwrap_or(&ZEROS))
-}
-
-/// A batch of a column; the last one, which is shorter, in a buffer whose end is left as it is.
-#[inline(always)]
-fn batch<'a, T: Copy>(column: &'a [T], first: usize, buffer: &'a mut [T; BATCH]) -> &'a [T; BATCH] {
-    let rest = &column[first..];
-    rest.first_chunk().unwrap_or_else(|| {
-        buffer[..rest.len()].copy_from_slice(rest);
-        buffer
-    })
 }
 
 /// The second pass: a batch is integrated and added up; one that is not `WHOLE` is cut by the sector.
@@ -376,13 +366,11 @@ mod tests {
         let mut expected = [0.0; 2];
         for i in 0..many.len() {
             let mut one = Segments::default();
-            let start = many.start.each_ref().map(|c| c[i]);
-            one.push(
-                start,
-                std::array::from_fn(|k| start[k] + many.length[i] * many.tangent[k][i]),
-                (many.owner[i], many.kind[i]),
-            );
-            let pull = if many.owner[i] == 7 { [0.0; 2] } else { sum(&one, &adhesion) };
+            let start = many.start.each_ref().map(|c| c.as_flattened()[i]);
+            let chord = many.tangent.each_ref().map(|c| many.length.as_flattened()[i] * c.as_flattened()[i]);
+            let (owner, kind) = (many.owner.as_flattened()[i], many.kind.as_flattened()[i]);
+            one.push(start, std::array::from_fn(|k| start[k] + chord[k]), (owner, kind));
+            let pull = if owner == 7 { [0.0; 2] } else { sum(&one, &adhesion) };
             expected = [expected[0] + pull[0], expected[1] + pull[1]];
         }
         let found = sum(&many, &adhesion);

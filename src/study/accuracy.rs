@@ -21,7 +21,7 @@
 //! the choice is the same everywhere. The tolerance of the load path is ε/1000. Keys that the scene gives itself are
 //! kept. Ours: all of this.
 
-use super::laboratory::{ConeView, Laboratory, cones, few_axons, root_mean_square, run_until};
+use super::laboratory::{ConeView, Laboratory, chaotic, cones, few_axons, root_mean_square, run_until};
 use super::run::{RunError, read};
 use crate::model::health::Counters;
 use crate::model::mechanism::Roster;
@@ -57,8 +57,6 @@ const MOST_VERTICES: f64 = 1e5;
 const VERTEX_IN_A_PASS: f64 = 10.0;
 /// Work for a vertex at each stage of a tissue that moves.
 const VERTEX_AT_A_STAGE: f64 = 0.02;
-/// What pilots leave out: with it paths are chaotic.
-pub(super) const CHAOTIC: [&str; 2] = ["fasciculation", "heading_noise"];
 
 /// What was found for a scene that states an accuracy.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -333,7 +331,7 @@ impl Search<'_> {
 
     fn pilot(&mut self) -> Result<Pilot, RunError> {
         self.pilots += 1;
-        let without: Vec<&str> = CHAOTIC.into_iter().filter(|name| self.scene.blocks.contains_key(*name)).collect();
+        let without = chaotic(self.scene);
         let mut set = self.keys();
         set.extend(few_axons(self.scene, PILOT_AXONS));
         let mut simulation = self.laboratory.assemble(&self.laboratory.load(&without, &set)?)?;

@@ -185,6 +185,11 @@ pub fn cones(simulation: &Simulation) -> Vec<ConeView> {
     query.map(|mut query| query.iter(world).map(view).collect()).unwrap_or_default()
 }
 
+/// The blocks of a scene with which paths are chaotic, so that tips cannot be compared: contact and noise.
+pub fn chaotic(scene: &Loaded) -> Vec<&'static str> {
+    ["fasciculation", "heading_noise"].into_iter().filter(|name| scene.blocks.contains_key(*name)).collect()
+}
+
 /// The keys, as `--set` takes them, that leave each population `most` axons at most.
 pub fn few_axons(scene: &Loaded, most: u64) -> Vec<String> {
     let larger = scene.scene.populations.iter().filter(|(_, population)| population.count > most);

@@ -26,14 +26,6 @@ fn numbers(value: &Value) -> Vec<f64> {
     value.as_array().unwrap().iter().map(|v| v.as_f64().unwrap()).collect()
 }
 
-/// Slope of log(error) over log(h) by least squares, for h halved from entry to entry.
-fn fitted_order(errors: &[f64]) -> f64 {
-    let n = errors.len() as f64;
-    let (mean_x, mean_y) = ((n - 1.0) / 2.0, errors.iter().map(|e| e.log2()).sum::<f64>() / n);
-    let pairs = errors.iter().enumerate().map(|(i, e)| (i as f64 - mean_x, e.log2() - mean_y));
-    -pairs.clone().map(|(x, y)| x * y).sum::<f64>() / pairs.map(|(x, _)| x * x).sum::<f64>()
-}
-
 fn length(a: [f64; 2], b: [f64; 2]) -> f64 {
     (a[0] - b[0]).hypot(a[1] - b[1])
 }

@@ -27,7 +27,7 @@ fn dot(a: [f64; 2], b: [f64; 2]) -> f64 {
 }
 
 /// Slope of log(error) over log(h) by least squares, for h halved from entry to entry.
-fn fitted_order(errors: &[f64]) -> f64 {
+pub(crate) fn fitted_order(errors: &[f64]) -> f64 {
     let n = errors.len() as f64;
     let (mean_x, mean_y) = ((n - 1.0) / 2.0, errors.iter().map(|e| e.log2()).sum::<f64>() / n);
     let pairs = errors.iter().enumerate().map(|(i, e)| (i as f64 - mean_x, e.log2() - mean_y));

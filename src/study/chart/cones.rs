@@ -3,7 +3,7 @@
 use super::work_precision::{ErrorKind, Factor, short};
 use crate::scenario::load::Loaded;
 use crate::study::laboratory::{
-    ConeView, Laboratory, Setting, angle_between, cones, few_axons, root_mean_square, run_until,
+    ConeView, Laboratory, Setting, angle_between, chaotic, cones, few_axons, root_mean_square, run_until,
 };
 use crate::study::run::RunError;
 use serde_json::Value;
@@ -34,7 +34,7 @@ pub fn charts(laboratory: &Laboratory, tick: &dyn Fn(f64)) -> Result<Vec<Factor>
     let mut cases = vec![Case {
         name: "cones",
         title: "Growth cones without contact and noise",
-        without: ["fasciculation", "heading_noise"].into_iter().filter(|name| has(name)).collect(),
+        without: chaotic(&scene),
         stop: end,
         adaptive: true,
         exact: "rk4",

@@ -11,9 +11,9 @@ use super::work_precision::{ErrorKind, Factor, Point, short, time};
 use crate::model::observables::Observables;
 use crate::model::tissue::Configuration;
 use crate::scenario::load::Loaded;
-use crate::study::accuracy::{CHAOTIC, difference};
+use crate::study::accuracy::difference;
 use crate::study::laboratory::{
-    ConeView, Laboratory, Setting, angle_between, cones, few_axons, root_mean_square, run_until,
+    ConeView, Laboratory, Setting, angle_between, chaotic, cones, few_axons, root_mean_square, run_until,
 };
 use crate::study::run::RunError;
 use serde_json::Value;
@@ -43,7 +43,7 @@ const KINDS: [(&str, &str); 2] =
 /// A scene that cannot be assembled or run.
 pub fn chart(laboratory: &Laboratory, tick: &dyn Fn(f64)) -> Result<Option<Factor>, RunError> {
     let scene = laboratory.scene()?;
-    let without: Vec<&str> = CHAOTIC.into_iter().filter(|name| scene.blocks.contains_key(*name)).collect();
+    let without = chaotic(&scene);
     let few = few_axons(&scene, MOST_AXONS);
     let own = laboratory.assemble(&laboratory.load(&without, &few)?)?;
     let moves = own.world().resource::<Configuration>().moves;

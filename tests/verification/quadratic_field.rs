@@ -2,6 +2,7 @@
 
 use std::f64::consts::{PI, TAU};
 
+use crate::reaction_diffusion::fitted_order;
 use serde_json::Value;
 use tropism::numerics::element_gradient::{MovingField, averaged_gradients, corner_gradients, linear_gradients};
 use tropism::numerics::locate::{MaterialPoint, SeedGrid};

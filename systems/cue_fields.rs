@@ -125,6 +125,17 @@ impl Mechanism for Cues {
         self.0.iter().flat_map(of).collect()
     }
 
+    fn mesh_errors(&self, tissue: &Tissue) -> Result<Vec<f64>, InstallError> {
+        let mut solvers = FieldSolvers::new(&tissue.mesh, tissue.regions.values().cloned().collect());
+        let mut worst = vec![0.0; tissue.mesh.cell_count()];
+        for (name, cue) in &self.0 {
+            let errors = problem(tissue, (name, cue), &tissue.mesh).gradient_errors(&mut solvers);
+            let errors = errors.map_err(|error| failed(name, error))?;
+            worst.iter_mut().zip(errors).for_each(|(worst, error)| *worst = error.max(*worst));
+        }
+        Ok(worst)
+    }
+
     fn install(self, model: &mut ModelBuilder) -> Result<(), InstallError> {
         model.insert_law(self).at_end(solve_demanded);
         model.term(Term::Fields, bring_fields);

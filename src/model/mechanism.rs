@@ -9,6 +9,7 @@ use super::health::Health;
 use super::plan::Plan;
 use super::random::Stream;
 use super::schedule::{Motion, Phase, Schedules, Slot, Term};
+use super::tissue::Tissue;
 use super::violation::{Violation, Violations};
 use bevy_ecs::prelude::{Component, IntoScheduleConfigs, Resource, World};
 use bevy_ecs::schedule::SystemSet;
@@ -37,6 +38,15 @@ pub trait Mechanism: DeserializeOwned + JsonSchema + Send + Sync + 'static {
     /// Shapes that the mesh must be fitted to, by name.
     fn outlines(&self) -> Vec<(String, Shape)> {
         Vec::new()
+    }
+
+    /// How wrong what it solves on the mesh of a tissue at rest is estimated to be, one number a cell; none where it solves nothing.
+    /// Asked only by a scene that refines its mesh.
+    ///
+    /// # Errors
+    /// What cannot be solved.
+    fn mesh_errors(&self, _tissue: &Tissue) -> Result<Vec<f64>, InstallError> {
+        Ok(Vec::new())
     }
 
     /// Puts systems, resources and components in place.
@@ -240,6 +250,7 @@ fn after<S: SystemSet + Copy>(
 pub(crate) trait Installable {
     fn check(&self, facts: &Facts) -> Violations;
     fn outlines(&self) -> Vec<(String, Shape)>;
+    fn mesh_errors(&self, tissue: &Tissue) -> Result<Vec<f64>, InstallError>;
     fn install(self: Box<Self>, model: &mut ModelBuilder) -> Result<(), InstallError>;
 }
 
@@ -250,6 +261,10 @@ impl<M: Mechanism> Installable for M {
 
     fn outlines(&self) -> Vec<(String, Shape)> {
         Mechanism::outlines(self)
+    }
+
+    fn mesh_errors(&self, tissue: &Tissue) -> Result<Vec<f64>, InstallError> {
+        Mechanism::mesh_errors(self, tissue)
     }
 
     fn install(self: Box<Self>, model: &mut ModelBuilder) -> Result<(), InstallError> {

@@ -36,17 +36,24 @@ impl Arrangement {
         Self { points, segments: join(cuts) }
     }
 
-    /// The same segments, each divided evenly into pieces no longer than `size` (µm).
-    pub fn sampled(&self, size: f64) -> Self {
+    /// The same segments, each divided evenly into pieces no longer than `size` (µm), and these halved while they are longer than
+    /// `size_at` their middle.
+    pub fn sampled(&self, size: f64, size_at: impl Fn([f64; 2]) -> f64) -> Self {
         let mut points = self.points.clone();
         let mut segments = Vec::new();
         for &[from, to] in &self.segments {
-            let (a, b) = (self.points[from as usize], self.points[to as usize]);
-            let pieces = (distance(a, b) / size - 1e-9).ceil().max(1.0) as usize;
+            let side = [self.points[from as usize], self.points[to as usize]];
+            let length = distance(side[0], side[1]);
+            let pieces = (length / size - 1e-9).ceil().max(1.0) as usize;
+            let mut shares = vec![0.0];
+            for piece in 1..=pieces {
+                let before = (piece - 1) as f64 / pieces as f64;
+                let too_long = |a: f64, b: f64| (b - a) * length > (1.0 + 2e-9) * size_at(along(side, 0.5 * (a + b)));
+                halve([before, piece as f64 / pieces as f64], &too_long, &mut shares);
+            }
             let mut last = from;
-            for piece in 1..pieces {
-                let share = piece as f64 / pieces as f64;
-                points.push([a[0] + share * (b[0] - a[0]), a[1] + share * (b[1] - a[1])]);
+            for &share in &shares[1..shares.len() - 1] {
+                points.push(along(side, share));
                 let next = (points.len() - 1) as u32;
                 segments.push([last, next]);
                 last = next;
@@ -54,6 +61,21 @@ impl Arrangement {
             segments.push([last, to]);
         }
         Self { points, segments }
+    }
+}
+
+fn along([a, b]: Segment, share: f64) -> [f64; 2] {
+    [a[0] + share * (b[0] - a[0]), a[1] + share * (b[1] - a[1])]
+}
+
+/// Adds the ends of the parts of a piece, the first of which is there already.
+fn halve([from, to]: [f64; 2], too_long: &impl Fn(f64, f64) -> bool, ends: &mut Vec<f64>) {
+    if too_long(from, to) {
+        let middle = 0.5 * (from + to);
+        halve([from, middle], too_long, ends);
+        halve([middle, to], too_long, ends);
+    } else {
+        ends.push(to);
     }
 }
 
@@ -143,9 +165,19 @@ mod tests {
 
     #[test]
     fn sampling_leaves_no_piece_longer_than_asked() {
-        let sampled = Arrangement::new(&[[[0.0, 0.0], [3.1, 0.0]], [[0.0, 0.0], [0.0, 3.0]]], 1e-9).sampled(1.0);
+        let sampled =
+            Arrangement::new(&[[[0.0, 0.0], [3.1, 0.0]], [[0.0, 0.0], [0.0, 3.0]]], 1e-9).sampled(1.0, |_| 1.0);
         assert_eq!(sampled.segments.len(), 4 + 3);
         let length = |s: &[u32; 2]| distance(sampled.points[s[0] as usize], sampled.points[s[1] as usize]);
         assert!(sampled.segments.iter().all(|s| length(s) <= 1.0 + 1e-12));
+    }
+
+    #[test]
+    fn pieces_are_halved_where_they_shall_be_shorter() {
+        let line = Arrangement::new(&[[[0.0, 0.0], [4.0, 0.0]]], 1e-9);
+        let sampled = line.sampled(1.0, |x| if x[0] > 3.0 { 0.25 } else { 1.0 });
+        let length = |s: &[u32; 2]| distance(sampled.points[s[0] as usize], sampled.points[s[1] as usize]);
+        let lengths: Vec<f64> = sampled.segments.iter().map(length).collect();
+        assert_eq!(lengths, [1.0, 1.0, 1.0, 0.25, 0.25, 0.25, 0.25]);
     }
 }

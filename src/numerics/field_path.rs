@@ -8,6 +8,7 @@ use std::sync::Arc;
 use crate::numerics::element_gradient::{MovingField, averaged_gradients, corner_gradients, linear_gradients};
 use crate::numerics::field_layout::FieldLayout;
 use crate::numerics::hermite::{HermiteError, HermitePath, Refinement, RefinementReport, ValueAndSlope, refine};
+use crate::numerics::mesh_grading::gradient_errors;
 use crate::numerics::quadratic_field::QuadraticSolver;
 use crate::numerics::reaction_diffusion::{
     ReactionDiffusion, ReactionDiffusionError, Source, StationarySolver, WorkCount,
@@ -170,6 +171,18 @@ impl FieldProblem<'_> {
             }
         };
         Ok(FieldPath { path, layout, report, flipped_from })
+    }
+
+    /// The [estimate](gradient_errors) of every cell at rest, by linear elements whatever the order.
+    ///
+    /// # Errors
+    /// A field that cannot be solved.
+    pub fn gradient_errors(&self, solvers: &mut FieldSolvers) -> Result<Vec<f64>, FieldPathError> {
+        let rest = self.mesh.vertices();
+        let (solver, recovery) = solvers.linear()?;
+        let c = solver.system(&self.equation, rest)?.solve(&self.sources_at(rest, None))?;
+        let decay_length = (self.equation.diffusion / self.equation.degradation).sqrt();
+        Ok(gradient_errors(self.mesh, &c, &recovery.recover(rest, &c, true), decay_length))
     }
 
     fn layout(&self, solvers: &mut FieldSolvers) -> Result<FieldLayout, ReactionDiffusionError> {

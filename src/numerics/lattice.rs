@@ -3,6 +3,7 @@
 use std::collections::HashMap;
 
 use crate::numerics::arrangement::Arrangement;
+use crate::numerics::mesh_grading::Grading;
 use crate::numerics::planar_domain::{Outline, PlanarDomain};
 use crate::numerics::polygon::{cross, minus, nearest_on_side, ring_contains, sides};
 
@@ -11,8 +12,9 @@ use crate::numerics::polygon::{cross, minus, nearest_on_side, ring_contains, sid
 const CLEARANCE: f64 = 0.6;
 
 /// Points of an equilateral lattice that keep their distance from all constraints. Where the domain is not convex the
-/// lattice also fills a box around it, so that refinement finds nothing to mend outside.
-pub(crate) fn lattice(domain: &PlanarDomain, constraints: &Arrangement, size: f64) -> Vec<[f64; 2]> {
+/// lattice also fills a box around it, so that refinement finds nothing to mend outside. Where the grading asks for a level, the
+/// points of a lattice of half the spacing are added, which holds all points of the coarser one.
+pub(crate) fn lattice(domain: &PlanarDomain, constraints: &Arrangement, size: f64, grading: &Grading) -> Vec<[f64; 2]> {
     let near = NearConstraints::new(constraints, size);
     let convex = is_convex(&domain.outer.points);
     let [mut low, mut high] = domain.bounding_box();
@@ -21,21 +23,33 @@ pub(crate) fn lattice(domain: &PlanarDomain, constraints: &Arrangement, size: f6
         (0..2).for_each(|i| (low[i], high[i]) = (low[i] - 2.0 * size, high[i] + 2.0 * size));
         let frame = Outline::rectangle(low, high);
         let sides: Vec<_> = sides(&frame.points).collect();
-        points = Arrangement::new(&sides, 0.0).sampled(size).points;
+        points = Arrangement::new(&sides, 0.0).sampled(size, |_| size).points;
     }
     let columns = ((high[0] - low[0]) / size).round().max(1.0);
     let rows = ((high[1] - low[1]) / (size * 0.75_f64.sqrt())).round().max(1.0);
-    let [dx, dy] = [(high[0] - low[0]) / columns, (high[1] - low[1]) / rows];
-    for row in 1..rows as usize {
-        let shift = if row % 2 == 0 { 0.0 } else { 0.5 };
-        for column in 0..=columns as usize {
-            let point = [low[0] + dx * (column as f64 + shift), low[1] + dy * row as f64];
-            let away_from_frame = point[0] - low[0] >= CLEARANCE * size && high[0] - point[0] >= CLEARANCE * size;
-            let wanted = if convex { ring_contains(&domain.outer.points, point) } else { away_from_frame };
-            if wanted && !near.within(point, CLEARANCE * size) {
-                points.push(point);
+    let spacing = [(high[0] - low[0]) / columns, (high[1] - low[1]) / rows];
+    let mut take = |level: u8, [from, to]: [[f64; 2]; 2]| {
+        let share = 0.5f64.powi(i32::from(level));
+        let [dx, dy, size] = [spacing[0], spacing[1], size].map(|length| share * length);
+        let first = |k: usize, step: f64| ((from[k] - low[k]) / step).floor().max(0.0) as usize;
+        let last = |k: usize, count: f64, step: f64| ((to[k] - low[k]) / step).ceil().min(count / share) as usize;
+        for row in first(1, dy).max(1)..(last(1, rows, dy) + 1).min((rows / share) as usize) {
+            let shift = if row % 2 == 0 { 0.0 } else { 0.5 };
+            for column in first(0, dx).saturating_sub(1)..=last(0, columns, dx) {
+                let point = [low[0] + dx * (column as f64 + shift), low[1] + dy * row as f64];
+                let of_coarser = level > 0 && row % 2 == 0 && column % 2 == row / 2 % 2;
+                let here = level == 0 || (0..2).all(|k| from[k] <= point[k] && point[k] < to[k]);
+                let away_from_frame = point[0] - low[0] >= CLEARANCE * size && high[0] - point[0] >= CLEARANCE * size;
+                let wanted = if convex { ring_contains(&domain.outer.points, point) } else { away_from_frame };
+                if here && !of_coarser && wanted && !near.within(point, CLEARANCE * grading.size_at(point)) {
+                    points.push(point);
+                }
             }
         }
+    };
+    take(0, [low, high]);
+    for level in 1..=grading.finest() {
+        grading.squares(level).for_each(|square| take(level, square));
     }
     points
 }

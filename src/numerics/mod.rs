@@ -15,6 +15,7 @@ mod lattice;
 pub mod load_path;
 pub mod locate;
 pub mod material;
+pub mod mesh_grading;
 pub mod newton;
 pub mod planar_domain;
 pub mod polygon;

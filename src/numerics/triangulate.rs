@@ -11,6 +11,7 @@ use spade::{AngleLimit, ConstrainedDelaunayTriangulation, Point2, RefinementPara
 
 use crate::numerics::arrangement::Arrangement;
 use crate::numerics::lattice::lattice;
+use crate::numerics::mesh_grading::Grading;
 use crate::numerics::planar_domain::{DomainError, Outline, PlanarDomain};
 use crate::numerics::polygon::{MERGE_TOLERANCE, bounding_box, cross, dot, minus, nearest_on_side, sides, signed_area};
 use crate::numerics::simplex_mesh::{MeshError, SimplexMesh};
@@ -108,6 +109,19 @@ pub fn triangulate(
     outlines: &[Outline],
     options: &MeshOptions,
 ) -> Result<FittedMesh, TriangulationError> {
+    triangulate_graded(domain, outlines, options, &Grading::even(options.size))
+}
+
+/// [`triangulate`] with shorter edges where a grading (of the same size) asks for them.
+///
+/// # Errors
+/// As [`triangulate`].
+pub fn triangulate_graded(
+    domain: &PlanarDomain,
+    outlines: &[Outline],
+    options: &MeshOptions,
+    grading: &Grading,
+) -> Result<FittedMesh, TriangulationError> {
     check_options(options)?;
     domain.check()?;
     for (index, outline) in outlines.iter().enumerate() {
@@ -119,8 +133,9 @@ pub fn triangulate(
         .flat_map(|ring| sides(&ring.points))
         .chain(outlines.iter().flat_map(|outline| sides(&outline.points)))
         .collect();
-    let constraints = Arrangement::new(&segments, MERGE_TOLERANCE * domain.diameter()).sampled(options.size);
-    let (vertices, triangles) = refined_triangles(domain, &constraints, options)?;
+    let constraints = Arrangement::new(&segments, MERGE_TOLERANCE * domain.diameter())
+        .sampled(options.size, |point| grading.size_at(point));
+    let (vertices, triangles) = refined_triangles(domain, &constraints, options, grading)?;
     let (vertices, cells) = kept_and_renumbered(domain, &vertices, &triangles);
     let mut mesh = SimplexMesh::new(vertices, cells)?;
     mesh.name_border(|midpoint| domain.edge_at(midpoint));
@@ -200,6 +215,7 @@ fn refined_triangles(
     domain: &PlanarDomain,
     constraints: &Arrangement,
     options: &MeshOptions,
+    grading: &Grading,
 ) -> Result<Soup, TriangulationError> {
     let too_many = TriangulationError::TooManyVertices { limit: options.max_vertices, size: options.size };
     let [low, high] = bounding_box(&domain.outer.points);
@@ -208,8 +224,11 @@ fn refined_triangles(
         return Err(too_many);
     }
     let mut points = constraints.points.clone();
-    points.extend(lattice(domain, constraints, options.size));
+    points.extend(lattice(domain, constraints, options.size, grading));
     points.extend(frame(domain));
+    if points.len() > options.max_vertices {
+        return Err(too_many);
+    }
     let settled = |x: f64| if x.abs() < 1e-100 { 0.0 } else { x };
     let points: Vec<_> = points.iter().map(|p| Point2::new(settled(p[0]), settled(p[1]))).collect();
     let count = points.len();

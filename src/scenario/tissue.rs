@@ -4,7 +4,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::keys;
-use crate::model::quantity::{Angle, Length};
+use crate::model::quantity::{Angle, Factor, Length};
 use crate::model::shape::{Point, coordinates, signed_area};
 
 keys! {
@@ -15,12 +15,24 @@ keys! {
         /// The longest edge wanted in the mesh; a quarter of the decay length of a cue is an upper bound.
         #[schemars(extend("exclusiveMinimum" = 0.0, "x-typical" = [2.0, 60.0]))]
         pub mesh_size: Length = Length(15.0),
+        /// Shorter edges where the cues' gradients ask for them. Absent: the same size everywhere.
+        pub refinement: Option<Refinement> = None,
         /// The smallest angle allowed in a triangle.
         #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 33.0, "x-typical" = [15.0, 30.0]))]
         pub min_angle: Angle = Angle(25.0),
         /// A mesh with more vertices is refused.
         #[schemars(extend("minimum" = 3))]
         pub max_vertices: u64 = 1_000_000,
+    }
+
+    /// Local refinement of the mesh: edges are halved where a cue's gradient is too wrong, tissue at rest. Ours.
+    pub struct Refinement {
+        /// Largest estimate |∇c_h − G|/(|G| + c/ℓ) that is left in a cell, ∇c_h its own gradient, G the recovered one (whose error is about the square).
+        #[schemars(extend("exclusiveMinimum" = 0.0, "x-typical" = [0.02, 0.3]))]
+        pub tolerance: Factor = Factor(0.1),
+        /// How often an edge may be halved.
+        #[schemars(extend("minimum" = 1, "maximum" = 10))]
+        pub levels: u64 = 4,
     }
 
     /// A closed line whose sides have names.

@@ -18,13 +18,13 @@ use crate::model::shelf::Shelf;
 use crate::model::stopwatch::Stopwatch;
 use crate::model::tissue::{Configuration, Tissue};
 use crate::model::violation::Violation;
+use crate::numerics::mesh_grading::{Grading, MOST_LEVELS};
 use crate::numerics::planar_domain::{Outline, PlanarDomain, Ring};
-use crate::numerics::triangulate::{MeshOptions, TriangulationError, triangulate};
+use crate::numerics::triangulate::{MeshOptions, TriangulationError, triangulate_graded};
 use crate::numerics::turning::derived;
 use crate::scenario::load::{Loaded, facts};
 use crate::scenario::scene::{self, Scene};
 use bevy_ecs::prelude::{IntoScheduleConfigs, World};
-use std::collections::BTreeMap;
 
 /// Why a scene could not be built.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -65,7 +65,7 @@ pub(super) fn assemble(loaded: &Loaded, roster: &Roster, shelf: &Shelf) -> Resul
     if scene.time.method == scene::Method::BogackiShampine {
         world.insert_resource(AdaptiveSteps::new(scene.time.tolerance().0, scene.time.duration.0));
     }
-    insert_tissue(&mut world, scene, &chosen)?;
+    insert_tissue(&mut world, loaded, &chosen)?;
     world.resource_mut::<Stopwatch>().lap("mesh");
     let cones = populate::spawn_cones(&mut world, scene)?;
     let mut schedules = Schedules::new();
@@ -141,7 +141,8 @@ fn growth(scene: &Scene) -> Growth {
 }
 
 /// Meshes the tissue, fitted to the targets and to every outline that a mechanism names.
-fn insert_tissue(world: &mut World, scene: &Scene, chosen: &[Chosen]) -> Result<(), AssemblyError> {
+fn insert_tissue(world: &mut World, loaded: &Loaded, chosen: &[Chosen]) -> Result<(), AssemblyError> {
+    let scene = &loaded.scene;
     let mut named: Vec<(String, String, Shape)> = Vec::new();
     for (name, shape) in &scene.targets {
         named.push((format!("/targets/{name}"), format!("targets/{name}"), shape.clone()));
@@ -149,9 +150,15 @@ fn insert_tissue(world: &mut World, scene: &Scene, chosen: &[Chosen]) -> Result<
     for Chosen { law, .. } in chosen {
         named.extend(law.outlines().into_iter().map(|(name, shape)| (format!("/{name}"), name, shape)));
     }
-    let inputs = format!("{:?} {named:?}", scene.tissue);
+    let mut inputs = format!("{:?} {named:?}", scene.tissue);
+    if scene.tissue.refinement.is_some() {
+        // What estimates errors on the mesh decides it too: the laws whose outlines it is fitted to.
+        let outlined = chosen.iter().filter(|chosen| !chosen.law.outlines().is_empty());
+        outlined.for_each(|chosen| inputs += &format!(" {:?}", loaded.blocks.get(chosen.name)));
+    }
     let shelf = world.resource::<Shelf>().clone();
-    let (tissue, _) = shelf.take(&inputs, || mesh(scene, named, &inputs))?;
+    let meshing = Meshing { scene, named, chosen, inputs: &inputs };
+    let (tissue, _) = shelf.take(&inputs, || meshing.tissue())?;
     let mut inside = vec![false; tissue.mesh.cell_count()];
     for name in scene.targets.keys() {
         let cells = tissue.regions.get(&format!("targets/{name}"));
@@ -164,25 +171,57 @@ fn insert_tissue(world: &mut World, scene: &Scene, chosen: &[Chosen]) -> Result<
     Ok(())
 }
 
-/// The tissue with a mesh fitted to outlines: pointer, name and shape of each.
-fn mesh(scene: &Scene, named: Vec<(String, String, Shape)>, inputs: &str) -> Result<Tissue, AssemblyError> {
-    let domain = domain(&scene.tissue.outline);
-    let size = scene.tissue.mesh_size.0;
-    let outlines: Vec<Outline> = named.iter().map(|(_, _, shape)| outline(shape, size)).collect();
-    let options = MeshOptions {
-        size,
-        min_angle: scene.tissue.min_angle.radians(),
-        max_vertices: scene.tissue.max_vertices as usize,
-    };
-    let fitted = triangulate(&domain, &outlines, &options).map_err(|error| match error {
-        TriangulationError::OutlineOutside { outline, point } => AssemblyError::at(
-            &named[outline].0,
-            format!("lies outside the tissue at ({:.4}, {:.4}) um", point[0], point[1]),
-        ),
-        other => AssemblyError::at("/tissue", other.to_string()),
-    })?;
-    let regions: BTreeMap<_, _> = named.into_iter().map(|(_, name, _)| name).zip(fitted.regions).collect();
-    Ok(Tissue::new(domain, fitted.mesh, regions, inputs))
+/// How the tissue of a scene is meshed.
+struct Meshing<'a> {
+    scene: &'a Scene,
+    /// Pointer, name and shape of each outline.
+    named: Vec<(String, String, Shape)>,
+    chosen: &'a [Chosen],
+    inputs: &'a str,
+}
+
+impl Meshing<'_> {
+    /// The tissue with a mesh fitted to the outlines, refined where the mechanisms' errors ask for it.
+    fn tissue(&self) -> Result<Tissue, AssemblyError> {
+        let keys = &self.scene.tissue;
+        let mut grading = Grading::even(keys.mesh_size.0);
+        let mut tissue = self.fitted(&grading)?;
+        let Some(refinement) = &keys.refinement else { return Ok(tissue) };
+        let most = refinement.levels.min(u64::from(MOST_LEVELS)) as u8;
+        // Each round goes one level deeper; as many again mend what new cells show.
+        for _ in 0..2 * most {
+            let mut any = false;
+            for Chosen { name, law, .. } in self.chosen {
+                let errors = law.mesh_errors(&tissue).map_err(|error| refused(name, error))?;
+                any |= grading.refine(&tissue.mesh, &errors, refinement.tolerance.0, most);
+            }
+            if !any {
+                break;
+            }
+            tissue = self.fitted(&grading)?;
+        }
+        Ok(tissue)
+    }
+
+    fn fitted(&self, grading: &Grading) -> Result<Tissue, AssemblyError> {
+        let keys = &self.scene.tissue;
+        let domain = domain(&keys.outline);
+        let outlines: Vec<Outline> = self.named.iter().map(|(_, _, shape)| outline(shape, grading)).collect();
+        let options = MeshOptions {
+            size: keys.mesh_size.0,
+            min_angle: keys.min_angle.radians(),
+            max_vertices: keys.max_vertices as usize,
+        };
+        let fitted = triangulate_graded(&domain, &outlines, &options, grading).map_err(|error| match error {
+            TriangulationError::OutlineOutside { outline, point } => AssemblyError::at(
+                &self.named[outline].0,
+                format!("lies outside the tissue at ({:.4}, {:.4}) um", point[0], point[1]),
+            ),
+            other => AssemblyError::at("/tissue", other.to_string()),
+        })?;
+        let names = self.named.iter().map(|(_, name, _)| name.clone());
+        Ok(Tissue::new(domain, fitted.mesh, names.zip(fitted.regions).collect(), self.inputs))
+    }
 }
 
 fn domain(outline: &scene::Outline) -> PlanarDomain {
@@ -194,9 +233,12 @@ fn domain(outline: &scene::Outline) -> PlanarDomain {
     PlanarDomain::new(ring(&outline.outer()), outline.holes().iter().map(ring).collect(), names.clone())
 }
 
-fn outline(shape: &Shape, size: f64) -> Outline {
+fn outline(shape: &Shape, grading: &Grading) -> Outline {
     match shape {
-        Shape::Disc { centre, radius } => Outline::disc([centre[0].0, centre[1].0], radius.0, size),
+        Shape::Disc { centre, radius } => {
+            let [x, y] = [centre[0].0, centre[1].0];
+            Outline::disc([x, y], radius.0, grading.size_at([x + radius.0, y]))
+        }
         Shape::Polygon { points } => Outline::new(coordinates(points)),
     }
 }

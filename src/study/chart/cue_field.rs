@@ -22,12 +22,17 @@ const POINTS: usize = 10_000;
 /// A relative change of the concentration over a cone (1/µm) below which nothing is sensed: 1 % over 10 µm.
 const SENSED: f64 = 1e-3;
 /// Method, element, gradient, mass.
-const METHODS: [(&str, &str, &str, &str); 4] = [
+const METHODS: [(&str, &str, &str, &str); 5] = [
     ("P1, raw gradient", "linear", "raw", "lumped"),
     ("P1, recovered, lumped", "linear", "recovered", "lumped"),
     ("P1, recovered, consistent", "linear", "recovered", "consistent"),
     ("P2", "quadratic", "recovered", "consistent"),
+    (REFINED, "linear", "recovered", "lumped"),
 ];
+/// The method whose mesh is refined locally: from a size four times as large, to a tolerance in proportion to it.
+const REFINED: &str = "P1, recovered, refined";
+const COARSER: f64 = 4.0;
+const TOLERANCE: f64 = 0.1;
 
 /// What a cone would sense at each point, for each cue.
 type Sensed = Vec<Vec<(f64, Vector3<f64>)>>;
@@ -111,15 +116,25 @@ fn setting(scene: &Loaded, size: f64, method: (&str, &str, &str, &str)) -> (bool
     (method.1 == "quadratic", size, setting)
 }
 
-fn keys(scene: &Loaded, size: f64, (_, element, gradient, mass): (&str, &str, &str, &str)) -> Vec<String> {
+fn keys(scene: &Loaded, size: f64, (name, element, gradient, mass): (&str, &str, &str, &str)) -> Vec<String> {
     let cues = scene.merged.get("cues").and_then(serde_json::Value::as_object);
     let names = cues.into_iter().flat_map(|cues| cues.keys());
     let of_cue = |name: &String| {
         let at = format!("/cues{}", crate::model::violation::pointer_token(name));
         [format!("{at}/element={element}"), format!("{at}/gradient={gradient}"), format!("{at}/mass={mass}")]
     };
-    let size = format!("/tissue/mesh_size={:e}", size * scene.scene.tissue.mesh_size.0);
-    names.flat_map(of_cue).chain([size]).collect()
+    let own = size * scene.scene.tissue.mesh_size.0;
+    let mesh = if name == REFINED {
+        let (tolerance, size) = (TOLERANCE * size, COARSER * own);
+        vec![
+            format!("/tissue/mesh_size={size:e}"),
+            format!("/tissue/refinement/tolerance={tolerance:e}"),
+            "/tissue/refinement/levels=8".to_owned(),
+        ]
+    } else {
+        vec![format!("/tissue/mesh_size={own:e}"), "/tissue/refinement=null".to_owned()]
+    };
+    names.flat_map(of_cue).chain(mesh).collect()
 }
 
 fn sensed(simulation: &Simulation, points: &[[f64; 2]]) -> Sensed {

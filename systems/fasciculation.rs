@@ -165,13 +165,7 @@ fn attract(
     mut cones: Cones,
 ) {
     let contact = ContactLaw::from(&law.0);
-    let asking = cones.collect(|cone, spring| Asking {
-        index: cone.index as u32,
-        population: cone.identity.population,
-        site: cone.site,
-        position: cone.position,
-        heading: spring.heading,
-    });
+    let asking = Asking::all(&cones);
     counters.neighbour_queries += asking.len() as u64;
     let pulls = index.for_each(&scene, &asking, |contacts: &mut Contacts<2>, cone, segments| {
         let state = (cone.position.xy().into(), cone.heading.xy().into());

@@ -1,12 +1,17 @@
 //! The roster: one line a mechanism, in order of summation. One file a mechanism or provider.
 
+pub mod bending_stiffness;
 pub mod borders;
 pub mod chemotaxis;
 pub mod cue_fields;
+pub mod durotaxis;
 pub mod fasciculation;
+pub mod growth_rate_modulation;
 pub mod heading_noise;
+pub mod leader_follower;
 pub mod matrix;
 pub mod shaft_index;
+pub mod steric_repulsion;
 
 use crate::model::mechanism::Roster;
 
@@ -16,7 +21,12 @@ pub fn standard() -> Roster {
         .with::<matrix::Matrix>()
         .with::<cue_fields::Cues>()
         .with::<chemotaxis::Chemotaxis>()
+        .with::<growth_rate_modulation::GrowthRateModulation>()
         .with::<fasciculation::Fasciculation>()
+        .with::<steric_repulsion::StericRepulsion>()
+        .with::<leader_follower::LeaderFollower>()
         .with::<borders::Borders>()
+        .with::<durotaxis::Durotaxis>()
+        .with::<bending_stiffness::BendingStiffness>()
         .with::<heading_noise::HeadingNoise>()
 }

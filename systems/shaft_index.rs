@@ -80,6 +80,19 @@ pub struct Asking {
     pub heading: Vector3<f64>,
 }
 
+impl Asking {
+    /// All growing cones, in their order.
+    pub fn all(cones: &Cones) -> Vec<Self> {
+        cones.collect(|cone, spring| Self {
+            index: cone.index as u32,
+            population: cone.identity.population,
+            site: cone.site,
+            position: cone.position,
+            heading: spring.heading,
+        })
+    }
+}
+
 /// The neighbour index over all shaft segments.
 #[derive(Debug, Resource, Default)]
 pub struct ShaftIndex {

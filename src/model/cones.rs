@@ -74,9 +74,14 @@ impl Cones<'_, '_> {
 
     /// Adds `pulls`, one a growing cone in the order of [`Self::collect`], times `weight`.
     pub fn add_pulls(&mut self, pulls: &[Vector3<f64>], weight: f64) {
+        self.apply(pulls, |spring, pull| spring.pull += pull * weight);
+    }
+
+    /// Calls `act` for each growing cone with its own of `values`, which are in the order of [`Self::collect`].
+    pub fn apply<T>(&mut self, values: &[T], act: impl Fn(&mut SpringState, &T)) {
         let growing = self.query.iter_mut().filter(|(_, status, ..)| **status == Status::Growing);
-        for ((.., mut spring), pull) in growing.zip(pulls) {
-            spring.pull += pull * weight;
+        for ((.., mut spring), value) in growing.zip(values) {
+            act(&mut spring, value);
         }
     }
 }

@@ -58,6 +58,7 @@ pub struct Shafts {
     weights: Vec<[f64; 2]>,
     used: Vec<u8>,
     next: Vec<u32>,
+    before: Vec<u32>,
     owner: Vec<u32>,
     chains: Vec<Chain>,
     laid: Vec<VertexId>,
@@ -75,6 +76,7 @@ impl Shafts {
             weights: Vec::new(),
             used: Vec::new(),
             next: Vec::new(),
+            before: Vec::new(),
             owner: Vec::new(),
             chains: vec![empty; count],
             laid: Vec::new(),
@@ -186,6 +188,7 @@ impl Shafts {
         self.next.push(NONE);
         self.owner.push(shaft as u32);
         let chain = &mut self.chains[shaft];
+        self.before.push(chain.last);
         if chain.last == NONE {
             chain.first = block;
         } else {
@@ -250,6 +253,14 @@ impl Shafts {
             };
             Some(here)
         })
+    }
+
+    /// The stored vertices of a shaft, from the last one back to the origin.
+    pub fn vertices_backwards(&self, shaft: usize) -> impl Iterator<Item = VertexId> + '_ {
+        let known = |block: u32| Some(block).filter(|&block| block != NONE);
+        let blocks =
+            std::iter::successors(known(self.chains[shaft].last), move |&block| known(self.before[block as usize]));
+        blocks.flat_map(|block| self.block_vertices(block).rev())
     }
 
     /// All material points of a shaft from the origin to the tip; empty before birth.
@@ -341,6 +352,9 @@ mod tests {
             assert_eq!(line.len(), 100);
             assert!((0..100).all(|i| line[i].weights == at(shaft, i)));
             assert!(shafts.vertices(shaft).all(|v| shafts.owner(v) as usize == shaft));
+            let mut backwards: Vec<_> = shafts.vertices_backwards(shaft).collect();
+            backwards.reverse();
+            assert!(shafts.vertices(shaft).eq(backwards));
         }
         assert_eq!(shafts.take_laid().len(), 3 * 99);
     }

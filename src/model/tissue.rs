@@ -138,6 +138,20 @@ impl Configuration {
         }
     }
 
+    /// The spatial gradient F⁻ᵀ g of what has the reference gradient g in a cell.
+    pub fn push_forward_gradient(&self, mesh: &SimplexMesh<2>, cell: u32, material: Vector3<f64>) -> Vector3<f64> {
+        if !self.moves {
+            return material;
+        }
+        match self.deformation_gradient(mesh, cell).try_inverse() {
+            Some(inverse) => {
+                let g = inverse.transpose() * Vector2::new(material.x, material.y);
+                Vector3::new(g.x, g.y, 0.0)
+            }
+            None => Vector3::repeat(f64::NAN),
+        }
+    }
+
     /// The spatial vector F v that belongs to a reference vector v in a cell.
     pub fn push_forward(&self, mesh: &SimplexMesh<2>, cell: u32, material: Vector3<f64>) -> Vector3<f64> {
         if !self.moves {

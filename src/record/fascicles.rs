@@ -41,6 +41,9 @@ pub struct HeightMeasures {
     pub mean_x_um: Option<f64>,
     /// Spread: sample standard deviation of the crossing positions x in µm; none with fewer than two axons.
     pub spread_um: Option<f64>,
+    /// Share of the crossing axons whose nearest neighbour on the line is of their own population: 1 where populations are sorted,
+    /// Σ n_k(n_k − 1)/(n(n − 1)) on average where they are mixed. None with fewer than two axons, or of one population only.
+    pub like_neighbours: Option<f64>,
     /// The bundles on the line.
     pub fascicles: Fascicles,
 }
@@ -64,17 +67,44 @@ impl Height {
 }
 
 /// Measures dispersion and bundling of the shafts (each origin → tip, µm) at a height, with linkage distance `linkage`
-/// in µm (the reach of a filopodium, 10 µm, is natural).
-pub fn measure_at_height(shafts: &[Vec<[f64; 2]>], height: Height, linkage: f64) -> HeightMeasures {
-    let positions: Vec<f64> = shafts.iter().filter_map(|shaft| first_crossing(shaft, height.y())).collect();
+/// in µm (the reach of a filopodium, 10 µm, is natural). `populations` has the population of each shaft.
+pub fn measure_at_height(
+    shafts: &[Vec<[f64; 2]>],
+    populations: &[u16],
+    height: Height,
+    linkage: f64,
+) -> HeightMeasures {
+    let crossing = |(shaft, kind): (&Vec<[f64; 2]>, &u16)| first_crossing(shaft, height.y()).map(|x| (x, *kind));
+    let crossings: Vec<(f64, u16)> = shafts.iter().zip(populations).filter_map(crossing).collect();
+    let positions: Vec<f64> = crossings.iter().map(|(x, _)| *x).collect();
     HeightMeasures {
         share: height.share,
         y_um: height.y(),
         crossing: positions.len(),
         mean_x_um: statistics::mean(&positions),
         spread_um: statistics::standard_deviation(&positions),
+        like_neighbours: like_neighbours(crossings),
         fascicles: find_fascicles(&positions, linkage),
     }
+}
+
+/// Share of crossings (x in µm, population) whose nearest neighbour is of their own population; of two as near, the one to the left.
+fn like_neighbours(mut crossings: Vec<(f64, u16)>) -> Option<f64> {
+    crossings.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let several = crossings.iter().any(|(_, kind)| *kind != crossings[0].1);
+    let is_like = |i: &usize| {
+        let (x, kind) = crossings[*i];
+        let before = i.checked_sub(1).map(|j| crossings[j]);
+        let after = crossings.get(i + 1).copied();
+        let nearest = match (before, after) {
+            (Some(left), Some(right)) if right.0 - x < x - left.0 => Some(right),
+            (Some(left), _) => Some(left),
+            (None, right) => right,
+        };
+        nearest.is_some_and(|(_, other)| other == kind)
+    };
+    let like = (0..crossings.len()).filter(is_like).count();
+    several.then(|| like as f64 / crossings.len() as f64)
 }
 
 /// The x (µm) at which a shaft, walked from its origin, first meets the line at `y`, by linear interpolation; none if it
@@ -149,13 +179,24 @@ mod tests {
         let (count, step) = (21, 7.0);
         let shafts = upright(&(0..count).map(|i| step * f64::from(i)).collect::<Vec<_>>());
         let height = Height { share: 0.75, y_min: -20.0, y_max: 120.0 };
-        let measures = measure_at_height(&shafts, height, 10.0);
+        let measures = measure_at_height(&shafts, &vec![0; shafts.len()], height, 10.0);
         assert_eq!(measures.y_um, 85.0);
         assert_eq!(measures.crossing, 21);
         assert!((measures.mean_x_um.unwrap() - 70.0).abs() < 1e-12);
         let expected = step * (f64::from(count * (count + 1)) / 12.0).sqrt();
         assert!((measures.spread_um.unwrap() - expected).abs() < 1e-12);
         assert_eq!(measures.fascicles.largest_fraction, Some(1.0));
+    }
+
+    #[test]
+    fn neighbours_are_like_where_populations_are_sorted_and_unlike_where_they_alternate() {
+        let shafts = upright(&[0.0, 3.0, 7.0, 50.0, 52.0]);
+        let height = Height { share: 0.5, y_min: 0.0, y_max: 100.0 };
+        let like = |kinds: [u16; 5]| measure_at_height(&shafts, &kinds, height, 10.0).like_neighbours;
+        assert_eq!(like([0, 0, 0, 1, 1]), Some(1.0));
+        assert_eq!(like([0, 1, 0, 1, 0]), Some(0.0));
+        assert_eq!(like([0, 0, 1, 0, 1]), Some(0.4));
+        assert_eq!(like([2; 5]), None);
     }
 
     #[test]
@@ -173,7 +214,7 @@ mod tests {
     fn nobody_on_the_line_leaves_everything_unsaid() {
         let height = Height { share: 0.5, y_min: 0.0, y_max: 600.0 };
         for shafts in [vec![], vec![vec![]], upright(&[3.0])] {
-            let measures = measure_at_height(&shafts, height, 10.0);
+            let measures = measure_at_height(&shafts, &vec![0; shafts.len()], height, 10.0);
             assert_eq!((measures.crossing, measures.spread_um, measures.mean_x_um), (0, None, None));
             let json = serde_json::to_value(&measures).unwrap();
             assert!(json["fascicles"]["largest_fraction"].is_null());

@@ -11,6 +11,8 @@ use serde::Serialize;
 /// What is known of one *born* axon at the moment of measuring.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AxonRecord {
+    /// Index of its population.
+    pub population: u16,
     /// The shaft in space, origin → tip, µm.
     pub shaft: Vec<[f64; 2]>,
     /// When the axon was born, h.
@@ -78,9 +80,10 @@ pub struct Morphology {
 pub fn measure(axons: &[AxonRecord], options: &MeasureOptions) -> Morphology {
     let (early, late) = split_birth_window(axons);
     let shafts: Vec<Vec<[f64; 2]>> = axons.iter().map(|axon| axon.shaft.clone()).collect();
+    let populations: Vec<u16> = axons.iter().map(|axon| axon.population).collect();
     let height = |&share: &f64| {
         let height = Height { share, y_min: options.y_min, y_max: options.y_max };
-        measure_at_height(&shafts, height, options.linkage)
+        measure_at_height(&shafts, &populations, height, options.linkage)
     };
     Morphology {
         hits: count_hits(axons.iter()),
@@ -165,6 +168,7 @@ mod tests {
         // Starts upward, ends at `angle` (counter-clockwise) from upward.
         let end = [-300.0 * angle.sin(), 300.0 * angle.cos()];
         AxonRecord {
+            population: 0,
             shaft: vec![[0.0, 0.0], end],
             birth_time,
             arrival_time,

@@ -112,6 +112,7 @@ pub fn axon_records(world: &World) -> Vec<AxonRecord> {
     let born = cones.iter(world).filter(|(_, status, ..)| **status != Status::Unborn);
     born.zip(shafts(world))
         .map(|((cone, status, journey, spring), shaft)| AxonRecord {
+            population: cone.population,
             shaft,
             birth_time: cone.birth_time,
             arrival_time: (*status == Status::Arrived).then_some(journey.ended),

@@ -6,6 +6,7 @@ mod borders;
 mod common;
 mod cue_elements;
 mod fixed_pull;
+mod mechanisms;
 mod noise;
 mod tissue;
 mod turning;

@@ -15,6 +15,7 @@ use std::sync::Arc;
 
 pub use crate::numerics::imposed_motion::Prescribed;
 
+use crate::numerics::dissection::nested_dissection;
 use crate::numerics::imposed_motion::largest_extent;
 use crate::numerics::material::{Material, Tensor, jacobian, principal_stretches};
 use crate::numerics::simplex_mesh::SimplexMesh;
@@ -24,6 +25,8 @@ use crate::numerics::sparse::{PRESCRIBED, SparseError, SymmetricMatrix, Symmetri
 const MOST_CORNERS: usize = 4;
 /// Cells that one task looks at, at least.
 const CELLS_A_TASK: usize = 256;
+/// Cells whose element matrices are held at once: as many as a cache holds.
+const CELLS_A_BATCH: usize = 4096;
 
 /// Why a body could not be set up.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -113,10 +116,16 @@ impl<'m, const D: usize> Body<'m, D> {
             .enumerate()
             .map(|(cell, rows)| mesh.barycentric_gradients(mesh.vertices(), cell, rows))
             .collect();
-        let (rows, free) = prescribed.number_free();
+        let (rows, _) = prescribed.number_free();
         let elements: Vec<u32> =
             mesh.cells().iter().flat_map(|&v| rows[v as usize * D..(v as usize + 1) * D].iter().copied()).collect();
-        let pattern = SymmetricPattern::from_elements(free, &elements, stride * D)?;
+        let order: Vec<u32> = nested_dissection(mesh.vertices(), mesh.cells(), stride)
+            .into_iter()
+            .flat_map(|v| &rows[v as usize * D..(v as usize + 1) * D])
+            .copied()
+            .filter(|&row| row != PRESCRIBED)
+            .collect();
+        let pattern = SymmetricPattern::in_order(&order, &elements, stride * D)?;
         let volume: f64 = volumes.iter().sum();
         let strain_norm = (small_strain_stiffness(material.as_ref()) * volume).sqrt();
         let size = largest_extent(mesh.vertices());
@@ -292,12 +301,17 @@ impl<'m, const D: usize> Body<'m, D> {
             columns
         };
         tangent.clear();
-        for (cell, columns) in self.in_each_cell(columns_of).into_iter().enumerate() {
-            let shapes = self.cell_gradients(cell);
-            tangent.add_element(cell, |row, column| {
-                let (shape, stress) = (&shapes[row / D], &columns[column / D][column % D]);
-                (0..D).map(|j| stress[(row % D, j)] * shape[j]).sum()
-            });
+        let mut batch = Vec::new();
+        for first in (0..self.mesh.cell_count()).step_by(CELLS_A_BATCH) {
+            let cells = first..self.mesh.cell_count().min(first + CELLS_A_BATCH);
+            cells.clone().into_par_iter().with_min_len(CELLS_A_TASK).map(columns_of).collect_into_vec(&mut batch);
+            for (cell, columns) in cells.zip(&batch) {
+                let shapes = self.cell_gradients(cell);
+                tangent.add_element(cell, |row, column| {
+                    let (shape, stress) = (&shapes[row / D], &columns[column / D][column % D]);
+                    (0..D).map(|j| stress[(row % D, j)] * shape[j]).sum()
+                });
+            }
         }
     }
 }

@@ -4,6 +4,7 @@ pub mod arrangement;
 pub mod contact_integral;
 mod cue_element;
 pub mod delaunay;
+pub mod dissection;
 pub mod element_gradient;
 pub mod ellipticity;
 pub mod field_layout;

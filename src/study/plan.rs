@@ -91,7 +91,7 @@ fn tell_outputs(plan: &mut Plan, loaded: &Loaded, pictures: usize) {
     plan.keep("manifest.json", "always: what it takes to run the scene again");
     plan.keep(
         "trajectories.csv",
-        format!("always: a point of each axon born every {} h", output.trajectory_interval.0),
+        format!("always: a point of each axon born every {:.3} h", output.trajectory_interval.0),
     );
     let figure = "figure.svg, figure.png";
     match pictures {

@@ -349,7 +349,7 @@ fn tell_margins(plan: &mut Plan, name: &str, problem: &FieldProblem, field: &Fie
         format!("cue `{name}`: Delaunay, largest angles that face an edge over pi"),
         monotonicity.angles,
         1.0,
-        "no edge at the rim of a source or of the tissue can be flipped: less motion, or a finer mesh there",
+        "less motion, or a finer mesh at the rims of sources and of the tissue, whose edges are not flipped",
     );
     if problem.equation.mass == MassMatrix::Consistent {
         plan.compare(

@@ -49,6 +49,9 @@ enum Command {
         /// Print the plan as JSON
         #[arg(long)]
         json: bool,
+        /// Threads to use; the plan does not depend on it [default: all]
+        #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1024))]
+        threads: Option<u32>,
     },
     /// Runs the scene without each of its mechanisms, with the same random numbers, and tables what that changes
     Ablate {
@@ -160,7 +163,9 @@ pub fn run(arguments: impl IntoIterator<Item = impl Into<OsString> + Clone>, ros
 
 fn on_threads<T: Send>(cli: &Cli, work: impl FnOnce() -> Result<T, RunError> + Send) -> Result<T, RunError> {
     let own = match &cli.command {
-        Some(Command::Chart { threads, .. } | Command::Ablate { threads, .. }) => *threads,
+        Some(Command::Plan { threads, .. } | Command::Chart { threads, .. } | Command::Ablate { threads, .. }) => {
+            *threads
+        }
         _ => None,
     };
     let threads = own.or(cli.threads).unwrap_or(0) as usize;
@@ -173,7 +178,7 @@ fn on_threads<T: Send>(cli: &Cli, work: impl FnOnce() -> Result<T, RunError> + S
 
 fn execute(cli: &Cli, roster: &Roster) -> Result<ExitCode, RunError> {
     match &cli.command {
-        Some(Command::Plan { scene, json }) => return run_plan(scene, *json, roster),
+        Some(Command::Plan { scene, json, .. }) => return run_plan(scene, *json, roster),
         Some(Command::Ablate { scene, out, seeds, pairs, .. }) => {
             return run_ablation(scene, out.as_ref(), Extent { seeds: *seeds, pairs: *pairs }, roster);
         }

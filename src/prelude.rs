@@ -19,7 +19,7 @@ pub use crate::model::cones::{Cone, Cones, ConesWith};
 pub use crate::model::growth::{Growth, Population, Populations, ShaftPopulations, Targets};
 pub use crate::model::health::{Counters, Health};
 pub use crate::model::mechanism::{Demands, Facts, InstallError, Law, Mechanism, ModelBuilder, Roster, unknown_name};
-pub use crate::model::plan::Plan;
+pub use crate::model::plan::{Each, Plan, Work};
 pub use crate::model::quantity::{
     Angle, AngularSpeed, Area, Concentration, ConcentrationGradient, Diffusivity, ElectricField, Factor, Gradient,
     Kind, Length, Pressure, Quantity, Rate, ReleaseRate, Speed, StiffnessGradient, Time,

@@ -34,6 +34,8 @@ impl Mechanism for Borders {
         );
         // Two edges at a corner.
         model.pulls_up_to(2.0 * self.weight.0);
+        let facets = model.world.resource::<Tissue>().mesh.border().len();
+        model.plan().work(Self::NAME, Work::BorderFacet, facets as f64, Each::ConeStage);
         model.insert(EdgeBoxes::default()).insert_law(self);
         model.term(Term::Contact, (bound_edges, repel).chain());
         Ok(())

@@ -152,6 +152,7 @@ impl Mechanism for Chemotaxis {
             model.plan().leave_out("receptor weights over time", "no receptor has an availability or is silenced");
         }
         model.pulls_up_to(1.0);
+        model.plan().work(Self::NAME, Work::Sampled, self.receptors.len() as f64, Each::ConeStage);
         model.insert_law(self).term(Term::Sample, sample).at_end(bind_receptors);
         Ok(())
     }

@@ -288,14 +288,20 @@ fn solve(world: &World, cues: &[(&str, &Cue)]) -> Result<Solved, InstallError> {
 fn report(world: &mut World, (name, cue): (&str, &Cue), field: &FieldPath) {
     let mesh = Arc::clone(&world.resource::<Tissue>().mesh);
     let problem = problem(world.resource::<Tissue>(), (name, cue), &mesh);
-    let mut health = world.resource_mut::<Health>();
-    note_coarse_mesh(&mut health, name, &problem);
-    note(&mut health, name, field);
-    let levels = field.path.levels().len();
+    note(&mut world.resource_mut::<Health>(), name, field);
+    let (levels, unknowns) = (field.path.levels().len(), field.unknowns());
     let times = if levels == 1 { "once".to_owned() } else { format!("at {levels} load levels") };
     let kind = if problem.order == Order::Quadratic { " of quadratic elements" } else { "" };
-    let why = format!("read; {} unknowns{kind}, solved {times}", field.unknowns());
-    world.resource_mut::<Plan>().keep(format!("cue `{name}`"), why);
+    let mut plan = world.resource_mut::<Plan>();
+    plan.keep(format!("cue `{name}`"), format!("read; {unknowns} unknowns{kind}, solved {times}"));
+    tell_margins(&mut plan, name, &problem, field);
+    let part = format!("cue `{name}`");
+    let current = size_of::<f64>() * field.path.components();
+    plan.hold(&part, (field.path.bytes() + current) as f64, Each::Run);
+    plan.work(&part, Work::FieldUnknown, (levels * unknowns) as f64, Each::Run);
+    if levels > 1 {
+        plan.work(&part, Work::Interpolated, field.path.components() as f64, Each::Stage);
+    }
 }
 
 fn failed(cue: &str, error: impl std::fmt::Display) -> InstallError {
@@ -328,19 +334,48 @@ fn problem<'m>(tissue: &Tissue, (name, cue): (&str, &Cue), mesh: &'m SimplexMesh
     }
 }
 
-/// Warns of a mesh too coarse for the decay length ℓ = √(D/k): edges much longer than ℓ/4, or ℓ/2 of quadratic elements, whose
-/// nodes are twice as close.
-fn note_coarse_mesh(health: &mut Health, name: &str, problem: &FieldProblem) {
+/// Edges may be this much longer than advised: meshes come out a little coarser than asked for.
+const LENIENCE: f64 = 1.2;
+
+/// Compares the mesh with the decay length ℓ = √(D/k), of which an edge should take a quarter (half of it with quadratic elements,
+/// whose nodes are twice as close), and with what the discrete maximum principle asks for.
+fn tell_margins(plan: &mut Plan, name: &str, problem: &FieldProblem, field: &FieldPath) {
     let decay_length = (problem.equation.diffusion / problem.equation.degradation).sqrt();
-    let rest = problem.mesh.vertices();
-    let areas = (0..problem.mesh.cell_count()).map(|cell| problem.mesh.volume(rest, cell)).sum::<f64>();
-    let edge = (areas / problem.mesh.cell_count() as f64 * 4.0 / 3f64.sqrt()).sqrt();
-    let (longest, advised) = if problem.order == Order::Linear { (0.3, "a quarter") } else { (0.6, "a half") };
-    if edge > longest * decay_length {
-        health.note(format!(
-            "cue `{name}`: edges of about {edge:.3} um are long for a decay length of {decay_length:.3} um; {advised} is advised"
-        ));
+    plan.derive(format!("cue `{name}`: decay length"), decay_length, "um");
+    let edge = mean_edge(problem.mesh);
+    let (share, words) = if problem.order == Order::Linear { (0.25, "a quarter") } else { (0.5, "half") };
+    plan.compare(
+        format!("cue `{name}`: edge length over {words} of the decay length"),
+        edge / (share * decay_length),
+        LENIENCE,
+        format!(
+            "a finer mesh: edges of about {edge:.3} um are long for a decay length of {decay_length:.3} um; {words} is advised"
+        ),
+    );
+    let Some(monotonicity) = field.monotonicity else {
+        let why = "quadratic elements do not keep it on any mesh";
+        return plan.leave_out(format!("cue `{name}`: discrete maximum principle"), why);
+    };
+    plan.compare(
+        format!("cue `{name}`: Delaunay, largest angles that face an edge over pi"),
+        monotonicity.angles,
+        1.0,
+        "less motion, or a finer mesh at the rims of sources and of the tissue, whose edges are not flipped",
+    );
+    if problem.equation.mass == MassMatrix::Consistent {
+        plan.compare(
+            format!("cue `{name}`: maximum principle, consistent mass over diffusion at an edge"),
+            monotonicity.consistent_mass,
+            1.0,
+            "`lumped` mass, or a finer mesh; undershoots are sensed as zero",
+        );
     }
+}
+
+/// Edge (µm) of an equilateral triangle as large as the mean cell at rest.
+fn mean_edge(mesh: &SimplexMesh<2>) -> f64 {
+    let areas = (0..mesh.cell_count()).map(|cell| mesh.volume(mesh.vertices(), cell)).sum::<f64>();
+    (areas / mesh.cell_count() as f64 * 4.0 / 3f64.sqrt()).sqrt()
 }
 
 fn note(health: &mut Health, name: &str, field: &FieldPath) {

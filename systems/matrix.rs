@@ -86,6 +86,9 @@ keys! {
     }
 }
 
+/// Bytes an unknown that solving takes: tangent, factor and what belongs to them. Ours, measured.
+const WORKSPACE: f64 = 2000.0;
+
 impl LoadCurve {
     /// The largest load that is reached.
     fn largest(&self) -> f64 {
@@ -213,6 +216,14 @@ impl Mechanism for Matrix {
             1.0,
             "less motion, sliding edges or `neo_hookean`",
         );
+        let held = path.path().bytes() as f64 + WORKSPACE * unknowns as f64;
+        let (iterations, moved) = ((unknowns * report.newton_iterations) as f64, 2.0 * unknowns as f64);
+        let mut plan = model.plan();
+        plan.hold("matrix", held, Each::Run);
+        plan.work("matrix", Work::NewtonUnknown, iterations, Each::Run);
+        // Displacements and their rates, at each stage and at the step's end.
+        plan.work("matrix", Work::Interpolated, moved, Each::Stage);
+        plan.work("matrix", Work::Interpolated, moved, Each::Step);
         let curve = self.load.clone();
         model.insert(Loading { equilibria, inputs, curve, duration }).insert_law(self);
         model.motion(follow_load);

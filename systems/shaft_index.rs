@@ -11,6 +11,7 @@
 //! and are sorted; what is not within reach adds exactly nothing, so results are those of looking at every segment of every
 //! shaft, to the last bit.
 
+use crate::model::births::Origin;
 use crate::model::shafts::BLOCK;
 use crate::numerics::locate::MaterialPoint;
 use crate::numerics::polylines::{Part, Polyline, meeting};
@@ -19,7 +20,7 @@ use crate::prelude::*;
 use nalgebra::Vector2;
 use rayon::prelude::*;
 use rstar::primitives::GeomWithData;
-use rstar::{AABB, RTree};
+use rstar::{AABB, RTree, RTreeNode};
 use std::collections::HashMap;
 use std::sync::{Mutex, PoisonError};
 
@@ -27,6 +28,8 @@ type Entry = GeomWithData<[f64; 2], VertexId>;
 type Square = [i32; 2];
 const _: () = assert!(BLOCK == u16::BITS as usize);
 
+/// The part of the plan that the index is.
+const PART: &str = "shaft index";
 /// Side of a square over the reach.
 const SIDE: f64 = 3.0;
 /// Room for ‖F⁻¹‖ to grow before lists are made anew.
@@ -147,6 +150,7 @@ impl ShaftIndex {
                 index.search = if search == Search::All { search } else { index.search };
             }
             None => {
+                tell(model, reach);
                 model.insert(ShaftIndex { search, reach, ..ShaftIndex::default() });
                 model.phase(Phase::Neighbours, index_new_vertices);
             }
@@ -262,6 +266,42 @@ impl ShaftIndex {
             }
         }
     }
+}
+
+/// Room in the nodes of the tree over what stands in them. Ours, measured.
+const SLACK: f64 = 1.5;
+
+/// Says what the index holds and what looking `reach` far (µm) costs.
+fn tell(model: &mut ModelBuilder, reach: f64) {
+    let block = size_of::<Line>() + size_of::<u64>() + size_of::<bool>();
+    let bytes = SLACK * size_of::<RTreeNode<Entry>>() as f64 + block as f64 / BLOCK as f64;
+    let looked_at = if model.world.resource::<Configuration>().moves {
+        model.world.resource::<Tissue>().mesh.cell_count() as f64
+    } else {
+        0.0
+    };
+    let even = evenly_spread(model.world, reach);
+    let mut plan = model.plan();
+    plan.hold(PART, bytes, Each::ShaftVertex);
+    plan.work(PART, Work::Indexed, 1.0, Each::ShaftVertex);
+    plan.work(PART, Work::DeformedCell, looked_at, Each::Stage);
+    plan.work(PART, Work::Neighbourhood, 1.0, Each::ConeStage);
+    plan.work(PART, Work::EvenSegment, even, Each::ConeStage);
+}
+
+/// Segments within a square of half side `reach` (µm) about a cone, if half of the axons had gone before it and were evenly spread
+/// over the longer side of the box of all births, widened by the reach.
+fn evenly_spread(world: &mut World, reach: f64) -> f64 {
+    let mut origins = world.query::<&Origin>();
+    let tissue = world.resource::<Tissue>();
+    let (mut low, mut high) = (Vector3::repeat(f64::INFINITY), Vector3::repeat(f64::NEG_INFINITY));
+    for origin in origins.iter(world) {
+        let at = tissue.reference_position(origin.site);
+        (low, high) = (low.inf(&at), high.sup(&at));
+    }
+    let shafts = world.resource::<Shafts>();
+    let width = (high - low).max().max(0.0) + 2.0 * reach;
+    0.5 * shafts.count() as f64 / width * (2.0 * reach).powi(2) / shafts.mean_segment()
 }
 
 /// Puts a vertex into a list.

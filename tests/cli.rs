@@ -86,7 +86,8 @@ fn a_plan_is_printed_and_leaves_nothing_behind() {
         words.contains("does not need\n") && words.contains("matrix                      the scene has no such block")
     );
     assert!(!folder.0.join("out").exists());
-    let output = tropism(&folder, &["plan", "scene.json", "--json", "--set", "/populations/axons/count=1"]);
+    let output =
+        tropism(&folder, &["plan", "scene.json", "--json", "--threads", "1", "--set", "/populations/axons/count=1"]);
     let plan: Value = serde_json::from_slice(&output.stdout).unwrap();
     assert_eq!(plan["steps"], json!(60));
     assert_eq!(code(&tropism(&folder, &["plan", "scene.json", "--set", "/seed=-1"])), 2);

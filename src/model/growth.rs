@@ -1,5 +1,6 @@
 //! How growth cones grow in a scene: the constants of eq. (1), the populations, the targets.
 
+use crate::numerics::runge_kutta::{BOGACKI_SHAMPINE, EULER, HEUN, RK4};
 use bevy_ecs::prelude::Resource;
 use std::sync::Arc;
 
@@ -20,6 +21,17 @@ pub enum Method {
 }
 
 impl Method {
+    /// Evaluations of the right-hand side in a step.
+    pub fn stages(self) -> usize {
+        match self {
+            Self::Rotation => 1,
+            Self::Euler => EULER.stages(),
+            Self::Heun => HEUN.stages(),
+            Self::Rk4 => RK4.stages(),
+            Self::BogackiShampine => BOGACKI_SHAMPINE.stages(),
+        }
+    }
+
     /// The largest κΔt|L̂| for which the method damps what the turning law damps; none for a method that always does.
     pub fn stability_limit(self) -> Option<f64> {
         match self {

@@ -21,6 +21,9 @@ use crate::numerics::turning::{rotate_in_plane, turn};
 use bevy_ecs::prelude::{Local, World};
 use nalgebra::{Rotation3, Vector3};
 
+/// Bytes that are kept of a growth cone during a step.
+pub const BYTES_A_STEP: usize = size_of::<StepStart>();
+
 /// Runs one step for all growing cones, up to the clock's next instant or nearer if the step is adaptive, and leaves the
 /// tissue at the instant reached.
 pub fn advance(world: &mut World, cones: &mut ConeQuery, mut starts: Local<Vec<StepStart>>) {

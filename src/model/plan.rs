@@ -1,5 +1,5 @@
-//! What a scene needs and what it does not, told by those who decide it while the scene is put together, and how near the
-//! chosen steps and methods come to their limits.
+//! What a scene needs and what it does not, told by those who decide it while the scene is put together; how near the chosen
+//! steps and methods come to their limits; and what each part holds in memory and does how often.
 
 use bevy_ecs::prelude::Resource;
 use serde::Serialize;
@@ -48,6 +48,87 @@ impl fmt::Display for Margin {
     }
 }
 
+/// A number that follows from the scene's keys.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Derived {
+    /// What it is.
+    pub name: String,
+    /// Its value.
+    pub value: f64,
+    /// Its unit.
+    pub unit: &'static str,
+}
+
+impl fmt::Display for Derived {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} = {:.2} {}", self.name, self.value, self.unit)
+    }
+}
+
+/// What a part is needed for: its memory is held, or its work done, once for each of these.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Each {
+    /// The run.
+    Run,
+    /// An axon with its growth cone.
+    Axon,
+    /// A stored vertex of a shaft.
+    ShaftVertex,
+    /// A step of the clock in which something grows.
+    Step,
+    /// A stage of the integrator: one a step, or as many as the method has.
+    Stage,
+    /// A growing cone at a stage.
+    ConeStage,
+}
+
+/// Memory that is held to the end of the run.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Holding {
+    /// What holds it.
+    pub name: String,
+    /// Bytes.
+    pub bytes: f64,
+    /// For each of what.
+    pub each: Each,
+}
+
+/// Kinds of work whose time for one unit is known; an estimate of seconds multiplies.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Work {
+    /// An unknown in an iteration of Newton's method.
+    NewtonUnknown,
+    /// An unknown of a field at a load level: factor, field, gradient and their rates.
+    FieldUnknown,
+    /// A number interpolated between load levels.
+    Interpolated,
+    /// A cell whose deformation is looked at.
+    DeformedCell,
+    /// A gradient sampled and sensed.
+    Sampled,
+    /// A facet of a border looked at.
+    BorderFacet,
+    /// A cone that asks for shafts.
+    Neighbourhood,
+    /// A segment within reach of a cone if axons grew evenly spread.
+    EvenSegment,
+    /// A segment put into the neighbour index.
+    Indexed,
+}
+
+/// Work that the scene means.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Task {
+    /// Who does it.
+    pub name: String,
+    /// What is done.
+    pub work: Work,
+    /// How often.
+    pub amount: f64,
+    /// For each of what.
+    pub each: Each,
+}
+
 /// The plan of a scene.
 #[derive(Debug, Clone, Default, PartialEq, Resource, Serialize)]
 pub struct Plan {
@@ -55,6 +136,14 @@ pub struct Plan {
     pub parts: Vec<Part>,
     /// How near the limits are.
     pub margins: Vec<Margin>,
+    /// What follows from the keys of mechanisms.
+    pub derived: Vec<Derived>,
+    /// Memory that is held; the estimate of a plan adds it up.
+    #[serde(skip)]
+    pub holdings: Vec<Holding>,
+    /// Work that is done; the estimate of a plan adds it up.
+    #[serde(skip)]
+    pub tasks: Vec<Task>,
     /// The strongest pull |L̂| that the scene's mechanisms can add up to.
     pub strongest_pull: f64,
 }
@@ -73,6 +162,21 @@ impl Plan {
     /// Notes a quantity with its limit.
     pub fn compare(&mut self, name: impl Into<String>, value: f64, limit: f64, advice: impl Into<String>) {
         self.margins.push(Margin { name: name.into(), value, limit, advice: advice.into() });
+    }
+
+    /// Notes a number that follows from the keys, with its unit.
+    pub fn derive(&mut self, name: impl Into<String>, value: f64, unit: &'static str) {
+        self.derived.push(Derived { name: name.into(), value, unit });
+    }
+
+    /// Notes memory that a part holds.
+    pub fn hold(&mut self, name: impl Into<String>, bytes: f64, each: Each) {
+        self.holdings.push(Holding { name: name.into(), bytes, each });
+    }
+
+    /// Notes work that a part does.
+    pub fn work(&mut self, name: impl Into<String>, work: Work, amount: f64, each: Each) {
+        self.tasks.push(Task { name: name.into(), work, amount, each });
     }
 }
 

@@ -83,6 +83,22 @@ impl Shafts {
         }
     }
 
+    /// Length of a stored segment to be expected (µm): 0.8 of the longest. Ours, measured.
+    pub fn mean_segment(&self) -> f64 {
+        0.8 * self.longest
+    }
+
+    /// Bytes that a stored vertex takes, with its share of a full block.
+    pub fn bytes_a_vertex() -> f64 {
+        let block = size_of::<u8>() + 2 * size_of::<u32>();
+        (size_of::<u32>() + size_of::<f32>() + size_of::<[f64; 2]>()) as f64 + block as f64 / BLOCK as f64
+    }
+
+    /// Bytes that a shaft takes besides: its chain, and on average half a block that is not yet full.
+    pub fn bytes_a_shaft() -> f64 {
+        size_of::<Chain>() as f64 + 0.5 * BLOCK as f64 * Self::bytes_a_vertex()
+    }
+
     /// Number of shafts.
     pub fn count(&self) -> usize {
         self.chains.len()

@@ -3,15 +3,37 @@
 //! The off-diagonal entry of the P1 diffusion matrix for an edge is `−(D/2)(cot α₁ + cot α₂)`, with the angles that face the
 //! edge in its two triangles (one at the border). It has the sign that the discrete maximum principle needs exactly where
 //! the edge is locally Delaunay, `α₁ + α₂ ≤ π`, and at the border where α is not obtuse. With the consistent mass
-//! it needs `k (A₁ + A₂)/12 ≤ (D/2)(cot α₁ + cot α₂)`. Lawson's flips restore the first without moving a vertex.
+//! it needs `k (A₁ + A₂)/12 ≤ (D/2)(cot α₁ + cot α₂)`. Lawson's flips restore the first without moving a vertex. How near
+//! a mesh comes to either is a [`Monotonicity`].
 
 use std::collections::HashMap;
+use std::f64::consts::PI;
 
 use crate::numerics::polygon::{cross, dot, minus};
 use crate::numerics::simplex_mesh::BORDER;
 
 /// Sums of cotangents above this (negative) value count as Delaunay: four points on a circle, to round-off.
 const ROUND_OFF: f64 = -1e-10;
+/// Sums of cotangents are taken to be no less than this where something is divided by them.
+const LEAST_COTANGENTS: f64 = 1e-6;
+
+/// How near a triangulation comes to losing the discrete maximum principle: the worst edge, as a share of what is allowed.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Monotonicity {
+    /// Largest `(α₁ + α₂)/π` of an interior edge, or `α/(π/2)` of a border edge: up to 1 the edges are Delaunay, and solutions with
+    /// lumped mass keep the principle. Exactly 1 for four points on a circle.
+    pub angles: f64,
+    /// Largest `k (A₁ + A₂)/12` over `(D/2)(cot α₁ + cot α₂)`, border included: up to 1 solutions with consistent mass keep it.
+    /// A sum of cotangents below 1e-6 counts as 1e-6, so that it is finite.
+    pub consistent_mass: f64,
+}
+
+impl Monotonicity {
+    /// The worse of two triangulations, each in its own right.
+    pub fn worse(self, other: Self) -> Self {
+        Self { angles: self.angles.max(other.angles), consistent_mass: self.consistent_mass.max(other.consistent_mass) }
+    }
+}
 
 /// What the edges of a triangulation look like in one configuration.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -26,6 +48,8 @@ pub struct EdgeReport {
     pub consistent_mass: usize,
     /// Smallest `cot α₁ + cot α₂` of an interior edge, or `cot α` of a border edge.
     pub smallest_cotangents: f64,
+    /// How near the worst edges come to the discrete maximum principle.
+    pub monotonicity: Monotonicity,
 }
 
 impl EdgeReport {
@@ -81,16 +105,25 @@ impl Triangles {
                     continue;
                 }
                 let (mut cotangents, mut area) = self.cotangent_and_area(coordinates, cell, face);
+                let mut angles = angle(cotangents);
                 if other == BORDER {
+                    angles *= 2.0;
                     report.obtuse_at_border += usize::from(cotangents < ROUND_OFF);
                 } else {
                     let (more, and) = self.cotangent_and_area(coordinates, other as usize, self.back(other, cell));
+                    angles += angle(more);
                     (cotangents, area) = (cotangents + more, area + and);
                     report.interior += 1;
                     report.not_delaunay += usize::from(cotangents < ROUND_OFF);
                 }
-                report.consistent_mass += usize::from(degradation * area / 12.0 > 0.5 * diffusion * cotangents);
+                let mass = degradation * area / 12.0;
+                report.consistent_mass += usize::from(mass > 0.5 * diffusion * cotangents);
                 report.smallest_cotangents = report.smallest_cotangents.min(cotangents);
+                report.monotonicity = report.monotonicity.worse(Monotonicity {
+                    // What is Delaunay to round-off does not pass the limit by round-off.
+                    angles: if cotangents < ROUND_OFF { angles / PI } else { (angles / PI).min(1.0) },
+                    consistent_mass: mass / (0.5 * diffusion * cotangents.max(LEAST_COTANGENTS)),
+                });
             }
         }
         report
@@ -164,6 +197,11 @@ impl Triangles {
             *slot = to as u32;
         }
     }
+}
+
+/// The angle in (0, π) of a cotangent.
+fn angle(cotangent: f64) -> f64 {
+    1f64.atan2(cotangent)
 }
 
 /// One label a cell that tells apart every combination of `regions` (lists of cells, which may overlap): cells of equal label
@@ -243,6 +281,42 @@ mod tests {
         let triangles = Triangles::new(&[0, 1, 2, 1, 3, 2]);
         let inner = |k: f64| triangles.edge_report(&x, 1.0, k).consistent_mass;
         assert_eq!((inner(7.999), inner(8.001)), (0, 5));
+    }
+
+    /// The monotonicity of two triangles over the edge from (−1, 0) to (1, 0), their tips at heights h above and below.
+    fn pair(height: f64, diffusion: f64, degradation: f64) -> Monotonicity {
+        let x = [[-1.0, 0.0], [1.0, 0.0], [0.0, height], [0.0, -height]];
+        Triangles::new(&[0, 1, 2, 1, 0, 3]).edge_report(&x, diffusion, degradation).monotonicity
+    }
+
+    #[test]
+    fn angle_sums_are_those_of_right_equilateral_and_obtuse_triangles() {
+        let third = 1.0 / 3f64.sqrt();
+        // Right angles at the tips: their sum is pi. 120 degrees: 4/3 pi. Equilateral: 60 degrees face every edge, the border's too.
+        for (height, share) in [(1.0, 1.0), (third, 4.0 / 3.0), (3f64.sqrt(), 2.0 / 3.0)] {
+            assert!((pair(height, 1.0, 0.0).angles - share).abs() < 1e-14, "{height}: {:?}", pair(height, 1.0, 0.0));
+        }
+        assert!(pair(1.0, 1.0, 0.0).angles <= 1.0, "a square is Delaunay, and round-off does not say otherwise");
+        // One right triangle: its right angle faces the border and is all that is allowed; 120 degrees are a third too many.
+        let lone = |height: f64| {
+            let x = [[-1.0, 0.0], [1.0, 0.0], [0.0, height]];
+            Triangles::new(&[0, 1, 2]).edge_report(&x, 1.0, 0.0).monotonicity.angles
+        };
+        assert!((lone(1.0) - 1.0).abs() < 1e-14 && (lone(third) - 4.0 / 3.0).abs() < 1e-14);
+    }
+
+    #[test]
+    fn the_consistent_mass_of_equilateral_triangles_is_bounded_by_k_h_squared_over_d_of_eight() {
+        // Every edge has as many areas h² √3/4 as cotangents 1/√3: k (√3/4 h²)/12 over (D/2)/√3 is k h²/(8 D).
+        for (diffusion, degradation) in [(1.0, 0.5), (3.0, 6.0), (2.0, 40.0)] {
+            let found = pair(3f64.sqrt(), diffusion, degradation).consistent_mass;
+            let bound = degradation * 4.0 / (8.0 * diffusion);
+            assert!((found / bound - 1.0).abs() < 1e-14, "{found} {bound}");
+        }
+        let right_angles = pair(1.0, 1.0, 1.0).consistent_mass;
+        assert!(right_angles > 1e4 && right_angles.is_finite(), "{right_angles}");
+        let merged = pair(1.0, 1.0, 1.0).worse(pair(1.0 / 3f64.sqrt(), 1.0, 0.0));
+        assert!((merged.angles - 4.0 / 3.0).abs() < 1e-14 && merged.consistent_mass == right_angles);
     }
 
     #[test]

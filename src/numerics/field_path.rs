@@ -5,6 +5,7 @@
 
 use std::sync::Arc;
 
+use crate::numerics::delaunay::Monotonicity;
 use crate::numerics::element_gradient::{MovingField, averaged_gradients, corner_gradients, linear_gradients};
 use crate::numerics::field_layout::FieldLayout;
 use crate::numerics::hermite::{HermiteError, HermitePath, Refinement, RefinementReport, ValueAndSlope, refine};
@@ -97,6 +98,16 @@ impl<'m> FieldSolvers<'m> {
     }
 }
 
+/// A field at one load.
+struct Level {
+    /// c and ∇c, with their derivatives along a motion of the vertices, if they move.
+    found: ValueAndSlope,
+    /// Whether edges were flipped.
+    flipped: bool,
+    /// How near the mesh comes to losing the discrete maximum principle.
+    edges: Option<Monotonicity>,
+}
+
 /// One field on a mesh.
 #[derive(Debug)]
 pub struct FieldProblem<'m> {
@@ -127,6 +138,9 @@ pub struct FieldPath {
     pub report: RefinementReport,
     /// The least load at which edges were flipped (linear elements only).
     pub flipped_from: Option<f64>,
+    /// How near the meshes of all levels, edges flipped, come to losing the discrete maximum principle; none for quadratic
+    /// elements, which have no such principle.
+    pub monotonicity: Option<Monotonicity>,
 }
 
 impl FieldPath {
@@ -148,16 +162,17 @@ impl FieldProblem<'_> {
         goal: Refinement,
     ) -> Result<FieldPath, FieldPathError> {
         let layout = self.layout(solvers)?;
-        let mut flipped_from: Option<f64> = None;
+        let (mut flipped_from, mut monotonicity) = (None::<f64>, None::<Monotonicity>);
         let defect = |a: &[f64], b: &[f64]| layout.gradient_defect(self.mesh, (a, b), FLAT);
         let mut level = |load: f64, at: &[[f64; 2]], motion: Option<&[[f64; 2]]>| {
-            let (found, flipped) = match self.order {
+            let Level { found, flipped, edges } = match self.order {
                 Order::Linear => self.linear_level(solvers, &layout, at, motion)?,
-                Order::Quadratic => (self.quadratic_level(solvers, &layout, at, motion)?, false),
+                Order::Quadratic => self.quadratic_level(solvers, &layout, at, motion)?,
             };
             if flipped {
                 flipped_from = Some(flipped_from.map_or(load, |first| first.min(load)));
             }
+            monotonicity = edges.map(|edges| monotonicity.map_or(edges, |worst| worst.worse(edges)));
             Ok::<_, FieldPathError>(found)
         };
         let (path, report) = match configurations {
@@ -170,7 +185,7 @@ impl FieldProblem<'_> {
                 refine(&[0.0, 0.5, 1.0], evaluate, defect, goal)?
             }
         };
-        Ok(FieldPath { path, layout, report, flipped_from })
+        Ok(FieldPath { path, layout, report, flipped_from, monotonicity })
     }
 
     /// The [estimate](gradient_errors) of every cell at rest, by linear elements whatever the order.
@@ -194,14 +209,13 @@ impl FieldProblem<'_> {
         })
     }
 
-    /// c and ∇c, with their derivatives along a motion of the vertices, if they move; and whether edges were flipped.
     fn linear_level(
         &self,
         solvers: &mut FieldSolvers,
         layout: &FieldLayout,
         at: &[[f64; 2]],
         motion: Option<&[[f64; 2]]>,
-    ) -> Result<(ValueAndSlope, bool), ReactionDiffusionError> {
+    ) -> Result<Level, ReactionDiffusionError> {
         let (solver, recovery) = solvers.linear()?;
         let system = solver.system(&self.equation, at)?;
         let sources = self.sources_at(at, motion);
@@ -221,7 +235,8 @@ impl FieldProblem<'_> {
             }
         };
         let found = (layout.pack(&c, &gradient), layout.pack(&slope, &gradient_slope));
-        Ok((found, system.is_flipped()))
+        let edges = system.edge_report().map(|report| report.monotonicity);
+        Ok(Level { found, flipped: system.is_flipped(), edges })
     }
 
     fn quadratic_level(
@@ -230,7 +245,7 @@ impl FieldProblem<'_> {
         layout: &FieldLayout,
         at: &[[f64; 2]],
         motion: Option<&[[f64; 2]]>,
-    ) -> Result<ValueAndSlope, ReactionDiffusionError> {
+    ) -> Result<Level, ReactionDiffusionError> {
         let solver = solvers.quadratic()?;
         let system = solver.system(&self.equation, at)?;
         let sources = self.sources_at(at, motion);
@@ -244,7 +259,8 @@ impl FieldProblem<'_> {
             Gradient::Recovered => averaged_gradients(self.mesh, solver.nodes(), &field),
             Gradient::Raw => corner_gradients(self.mesh, solver.nodes(), &field),
         };
-        Ok((layout.pack(&values, &gradient), layout.pack(&rates, &gradient_slope)))
+        let found = (layout.pack(&values, &gradient), layout.pack(&rates, &gradient_slope));
+        Ok(Level { found, flipped: false, edges: None })
     }
 
     fn sources_at<'s>(&'s self, at: &[[f64; 2]], motion: Option<&[[f64; 2]]>) -> Vec<Source<'s>> {

@@ -111,6 +111,11 @@ impl HermitePath {
         self.levels[0].value.len()
     }
 
+    /// Bytes that the levels take.
+    pub fn bytes(&self) -> usize {
+        self.levels.iter().map(|level| size_of_val(&level.value[..]) + size_of_val(&level.slope[..])).sum()
+    }
+
     /// The weights at a parameter. Outside the levels the path is constant and its derivative zero.
     pub fn locate(&self, parameter: f64) -> HermiteWeights {
         let last = self.levels.len() - 1;

@@ -143,6 +143,10 @@ impl Budget {
 
 type Topology<const D: usize> = (Arc<SimplexMesh<D>>, Arc<SymmetricPattern>);
 
+/// What a system is set up on: the flipped connectivity, or none while the original is still Delaunay where it can be; and, in
+/// the plane, its triangles.
+type Chosen<const D: usize> = (Option<Topology<D>>, Option<Triangles>);
+
 /// Solves eq. (2) on one mesh in any number of configurations, keeping the symbolic factor of each connectivity.
 ///
 /// What is kept changes the cost, never the result.
@@ -192,7 +196,8 @@ impl<'m, const D: usize> StationarySolver<'m, D> {
         check_law(law)?;
         check_length("coordinates", coordinates.len(), self.mesh.vertex_count())?;
         check_volumes(self.mesh, coordinates)?;
-        let (flipped, pattern) = match self.topology(coordinates)? {
+        let (topology, triangles) = self.topology(coordinates)?;
+        let (flipped, pattern) = match topology {
             Some((mesh, pattern)) => (Some(mesh), pattern),
             None => (None, Arc::clone(&self.pattern)),
         };
@@ -200,7 +205,7 @@ impl<'m, const D: usize> StationarySolver<'m, D> {
         let factor = assemble(law, meshes, coordinates, &pattern).cholesky()?;
         self.factorisations += 1;
         let solves = Arc::clone(&self.solves);
-        Ok(StationarySystem { law: *law, original: self.mesh, flipped, coordinates, factor, solves })
+        Ok(StationarySystem { law: *law, original: self.mesh, flipped, triangles, coordinates, factor, solves })
     }
 
     /// The field c (nM, one entry a vertex) of the given sources in a configuration.
@@ -230,16 +235,16 @@ impl<'m, const D: usize> StationarySolver<'m, D> {
         self.system(law, coordinates)?.solve_with_rate(velocity, sources)
     }
 
-    /// The flipped mesh and its pattern, or `None` while the original is still Delaunay where it can be.
-    fn topology(&mut self, coordinates: &[[f64; D]]) -> Result<Option<Topology<D>>, ReactionDiffusionError> {
-        let Some(plane) = in_plane(coordinates) else { return Ok(None) };
+    /// The connectivity for a configuration.
+    fn topology(&mut self, coordinates: &[[f64; D]]) -> Result<Chosen<D>, ReactionDiffusionError> {
+        let Some(plane) = in_plane(coordinates) else { return Ok((None, None)) };
         let mut triangles = Triangles::new(self.mesh.cells());
         if triangles.flip_to_delaunay(&plane, &self.labels) == 0 {
-            return Ok(None);
+            return Ok((None, Some(triangles)));
         }
         let cells = triangles.flat();
         if let Some(known) = self.flipped.iter().find(|(mesh, _)| mesh.cells() == cells) {
-            return Ok(Some(known.clone()));
+            return Ok((Some(known.clone()), Some(triangles)));
         }
         let pattern = SymmetricPattern::from_elements(self.mesh.vertex_count(), &cells, D + 1)?;
         let mesh = Arc::new(SimplexMesh::new(coordinates.to_vec(), cells)?);
@@ -248,7 +253,7 @@ impl<'m, const D: usize> StationarySolver<'m, D> {
             self.flipped.remove(0);
         }
         self.flipped.push((Arc::clone(&mesh), Arc::clone(&pattern)));
-        Ok(Some((mesh, pattern)))
+        Ok((Some((mesh, pattern)), Some(triangles)))
     }
 }
 
@@ -258,6 +263,7 @@ pub struct StationarySystem<'a, const D: usize> {
     law: ReactionDiffusion,
     original: &'a SimplexMesh<D>,
     flipped: Option<Arc<SimplexMesh<D>>>,
+    triangles: Option<Triangles>,
     coordinates: &'a [[f64; D]],
     factor: Factor,
     solves: Arc<AtomicUsize>,
@@ -280,8 +286,7 @@ impl<const D: usize> StationarySystem<'_, D> {
 
     /// What the edges of the connectivity in use look like, in the plane.
     pub fn edge_report(&self) -> Option<EdgeReport> {
-        let plane = in_plane(self.coordinates)?;
-        let triangles = Triangles::new(self.mesh().cells());
+        let (plane, triangles) = (in_plane(self.coordinates)?, self.triangles.as_ref()?);
         Some(triangles.edge_report(&plane, self.law.diffusion, self.law.degradation))
     }
 

@@ -147,6 +147,12 @@ impl<const D: usize> SimplexMesh<D> {
         }
     }
 
+    /// Bytes that the mesh takes.
+    pub fn bytes(&self) -> usize {
+        let topology = size_of_val(&self.cells[..]) + size_of_val(&self.neighbours[..]);
+        size_of_val(&self.vertices[..]) + topology + size_of_val(&self.border[..])
+    }
+
     /// Number of vertices.
     pub fn vertex_count(&self) -> usize {
         self.vertices.len()

@@ -10,6 +10,9 @@ use resvg::tiny_skia::{IntSize, Pixmap};
 /// Samples a pixel in each direction.
 const SUPERSAMPLES: usize = 2;
 
+/// Bytes that painting a triangulation takes for each pixel of its sheet, the sheet's own included.
+pub const BYTES_A_PIXEL: usize = SUPERSAMPLES * SUPERSAMPLES * size_of::<Option<[f32; 3]>>() + size_of::<u32>();
+
 /// A sheet of pixels over a rectangle.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sheet {

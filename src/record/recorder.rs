@@ -42,6 +42,11 @@ impl Recorder {
         }
     }
 
+    /// Instants (ticks) of the pictures that are still to come, ascending.
+    pub fn pictures_due(&self) -> &[u64] {
+        &self.figures
+    }
+
     /// Whether something is to be seen at an instant (ticks).
     pub fn is_due(&self, now: u64) -> bool {
         (self.interval.is_some() && now >= self.next_point) || self.figures.first().is_some_and(|due| now >= *due)

@@ -6,9 +6,10 @@
 //! light. [`draw`] draws; [`super::png::to_png`] makes a picture of it.
 
 use super::colour::Effect;
+use super::raster;
 use super::scene_layout::Layout;
 use super::scene_legend::Legend;
-use super::scene_panel::PanelPainter;
+use super::scene_panel::{FIELD_DENSITY, PanelPainter};
 use super::svg::Svg;
 use super::theme;
 use rayon::prelude::*;
@@ -195,6 +196,18 @@ pub fn draw(figure: &SceneFigure) -> Result<Svg, FigureError> {
     parts.into_iter().for_each(|part| svg.append(part));
     legend.draw(&mut svg, &placed, [theme::MARGIN, layout.height]);
     Ok(svg)
+}
+
+/// Bytes that drawing a figure of `panels` panels of one extent (µm) takes, and making a picture of it with `scale` pixels for a
+/// px: the field of one panel, as with one thread, and the page.
+///
+/// # Errors
+/// No panel, or no extent.
+pub fn bytes_to_draw(panels: usize, extent: [f64; 2], scale: f64) -> Result<f64, FigureError> {
+    let empty = Panel { vertices: vec![[0.0; 2], extent], ..Panel::default() };
+    let layout = Layout::of(&SceneFigure::new(" ", " ", vec![empty; panels]))?;
+    let page = layout.width * layout.height * scale.powi(2) * size_of::<u32>() as f64;
+    Ok(page + layout.drawing_area() * FIELD_DENSITY.powi(2) * raster::BYTES_A_PIXEL as f64)
 }
 
 fn check_panel(index: usize, panel: &Panel) -> Result<(), FigureError> {

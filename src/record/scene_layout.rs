@@ -105,6 +105,11 @@ impl Layout {
         CellPlace { corner, view }
     }
 
+    /// Area of the drawing of one panel, px².
+    pub(super) fn drawing_area(&self) -> f64 {
+        self.drawing_height() * self.scale * (self.high[0] - self.low[0])
+    }
+
     /// Height of the drawing of one panel, px.
     fn drawing_height(&self) -> f64 {
         self.scale * (self.high[1] - self.low[1])

@@ -13,7 +13,7 @@ use rayon::prelude::*;
 use resvg::tiny_skia::Pixmap;
 
 /// Pixels of the field's image for one px.
-const FIELD_DENSITY: f64 = 2.0;
+pub(super) const FIELD_DENSITY: f64 = 2.0;
 /// Pixels of the density of shafts for one px.
 const COVERAGE_DENSITY: f64 = 3.0;
 /// Polylines are drawn to within this many px.

@@ -10,9 +10,10 @@ use crate::model::health::{Counters, Health};
 use crate::model::integrator::{advance, bring_tissue_to};
 use crate::model::mechanism::{InstallError, Installable, ModelBuilder, Roster};
 use crate::model::observables::Observables;
-use crate::model::plan::Plan;
+use crate::model::plan::{Each, Plan};
 use crate::model::schedule::{MotionSchedule, Phase, RightHandSide, Schedules, Term};
 use crate::model::settle::settle;
+use crate::model::shafts::Shafts;
 use crate::model::shape::{Shape, coordinates};
 use crate::model::shelf::Shelf;
 use crate::model::stopwatch::Stopwatch;
@@ -282,7 +283,13 @@ fn plan(world: &mut World, loaded: &Loaded, roster: &Roster) {
     let tolerance = world.get_resource::<AdaptiveSteps>().map(|steps| steps.tolerance);
     let [low, high] = world.resource::<Tissue>().domain.bounding_box();
     let extent = (high[0] - low[0]).min(high[1] - low[1]);
+    let tissue = world.resource::<Tissue>();
+    let configuration = 2 * size_of_val(tissue.mesh.vertices());
+    let mesh = (tissue.mesh.bytes() + configuration) as f64;
     let mut plan = world.resource_mut::<Plan>();
+    plan.hold("mesh", mesh, Each::Run);
+    plan.hold("axons", populate::BYTES_AN_AXON as f64 + Shafts::bytes_a_shaft(), Each::Axon);
+    plan.hold("shafts", Shafts::bytes_a_vertex(), Each::ShaftVertex);
     for entry in roster.entries.iter().filter(|entry| !loaded.blocks.contains_key(entry.name)) {
         plan.leave_out(entry.name, "the scene has no such block");
     }

@@ -10,6 +10,7 @@ use crate::model::components::{
     Axon, GrowthCone, Journey, Position, ReceptorWeights, Site, SpringState, Status, Velocity,
 };
 use crate::model::growth::{Population, Populations, ShaftPopulations};
+use crate::model::integrator::BYTES_A_STEP;
 use crate::model::random::{KeyedRng, Stream};
 use crate::model::shafts::Shafts;
 use crate::model::tissue::Tissue;
@@ -32,6 +33,12 @@ const WHERE: u64 = 1;
 const SHAFT_TOLERANCE: f64 = 0.5;
 /// Longest stored shaft segment (µm). Ours.
 const LONGEST_SEGMENT: f64 = 12.0;
+
+/// What is known of a growth cone, besides what mechanisms attach.
+type ConeState = (GrowthCone, Origin, Status, Site, Position, Velocity, SpringState, ReceptorWeights, Journey);
+
+/// Bytes of an axon and its growth cone: their components, and what is kept of the cone during a step.
+pub(super) const BYTES_AN_AXON: usize = size_of::<Axon>() + size_of::<ConeState>() + BYTES_A_STEP;
 
 /// Spawns axons and growth cones; returns the cones in order.
 pub(super) fn spawn_cones(world: &mut World, scene: &Scene) -> Result<Vec<Entity>, AssemblyError> {
@@ -70,7 +77,7 @@ fn spawn(world: &mut World, axon: Axon, origin: Origin, speed: f64) -> Entity {
     world.spawn(axon);
     let birth_time = world.resource::<Clock>().grid.hours(axon.birth);
     let identity = GrowthCone { axon: axon.number, population: axon.population, speed, birth: axon.birth, birth_time };
-    let state = (
+    let state: ConeState = (
         identity,
         origin,
         Status::default(),

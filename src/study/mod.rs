@@ -3,6 +3,7 @@
 pub mod ablation;
 pub mod accuracy;
 pub mod chart;
+pub mod estimate;
 pub mod laboratory;
 pub mod plan;
 pub mod run;

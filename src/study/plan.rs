@@ -1,12 +1,15 @@
 //! What a scene needs before it runs: everything is put together and solved as for a run, but no step is taken.
 
-use super::run::{RunError, assembled};
+use super::estimate::{Estimate, Expectation, memory, seconds};
+use super::run::{DPI, RunError, assembled, recorder_options};
 use crate::model::clock::Clock;
 use crate::model::components::GrowthCone;
 use crate::model::health::{Counters, Health};
 use crate::model::mechanism::Roster;
 use crate::model::plan::Plan;
 use crate::model::tissue::Tissue;
+use crate::record::png::scale_for_dpi;
+use crate::record::recorder::Recorder;
 use crate::record::summary::{DerivedConstants, constants};
 use crate::scenario::load::Loaded;
 use bevy_ecs::prelude::World;
@@ -36,6 +39,12 @@ pub struct ScenePlan {
     pub trajectory_points_at_most: u64,
     /// What has been solved already.
     pub solved: Counters,
+    /// How much is to be expected of what costs something.
+    pub expected: Expectation,
+    /// Peak of resident memory of a run on one thread (MB).
+    pub memory_mb: Estimate,
+    /// CPU seconds of a run on one thread, with what the plan itself has solved.
+    pub cpu_seconds: Estimate,
     /// What the user should know of.
     pub notes: Vec<String>,
 }
@@ -50,21 +59,45 @@ pub fn plan(loaded: &Loaded, roster: &Roster, path: &Path) -> Result<ScenePlan, 
     let clock = *world.resource::<Clock>();
     let lifetimes = lifetimes(world, &clock);
     let interval = clock.grid.nearest(loaded.scene.output.trajectory_interval.0).max(1);
+    let points = lifetimes.iter().map(|ticks| ticks / interval + 1).sum();
+    let recorder = Recorder::new(&recorder_options(loaded, true), &clock.grid, clock.end);
+    let expected = Expectation::of(world, &recorder, points);
     let mesh = &world.resource::<Tissue>().mesh;
+    let mut plan = world.resource::<Plan>().clone();
+    tell_outputs(&mut plan, loaded, recorder.pictures_due().len());
     let found = ScenePlan {
         scene: loaded.scene.name.clone(),
-        plan: world.resource::<Plan>().clone(),
+        plan,
         derived: constants(world),
         mesh_vertices: mesh.vertex_count(),
         mesh_cells: mesh.cell_count(),
         steps: clock.end.div_ceil(clock.grid.step_ticks()),
         cone_steps_at_most: lifetimes.iter().map(|ticks| ticks.div_ceil(clock.grid.step_ticks())).sum(),
-        trajectory_points_at_most: lifetimes.iter().map(|ticks| ticks / interval + 1).sum(),
+        trajectory_points_at_most: points,
         solved: simulation.counters(),
+        memory_mb: memory::estimate(world, &expected, scale_for_dpi(DPI).into())?,
+        cpu_seconds: seconds::estimate(world, &expected),
+        expected,
         notes: world.resource::<Health>().notes().to_vec(),
     };
     simulation.lap("plan");
     Ok(found)
+}
+
+/// The files that a run writes, and what for.
+fn tell_outputs(plan: &mut Plan, loaded: &Loaded, pictures: usize) {
+    let output = &loaded.scene.output;
+    plan.keep("summary.json", format!("always: measures at {} heights, plan, cost", output.heights.len()));
+    plan.keep("manifest.json", "always: what it takes to run the scene again");
+    plan.keep(
+        "trajectories.csv",
+        format!("always: a point of each axon born every {:.3} h", output.trajectory_interval.0),
+    );
+    let figure = "figure.svg, figure.png";
+    match pictures {
+        0 => plan.leave_out(figure, "`output/figure_times` names no time"),
+        _ => plan.keep(figure, format!("{pictures} panels, one for each of `output/figure_times`")),
+    }
 }
 
 /// Ticks from the birth of each cone to the end of the run, of those born before it.
@@ -92,6 +125,13 @@ impl fmt::Display for ScenePlan {
         writeln!(f, "  {:<28}{cue_solves} ({cue_factorisations} factorisations)", "cue fields solved")?;
         writeln!(f, "  {:<28}{}, at most {} of cones", "steps", self.steps, self.cone_steps_at_most)?;
         writeln!(f, "  {:<28}at most {}", "points of trajectories", self.trajectory_points_at_most)?;
+        for (name, estimate, unit) in
+            [("memory", &self.memory_mb, "MB"), ("time", &self.cpu_seconds, "s of one thread")]
+        {
+            let largest = estimate.parts.iter().take(3).map(|part| format!("{} {:.2}", part.name, part.amount));
+            let largest = largest.collect::<Vec<_>>().join(", ");
+            writeln!(f, "  {name:<28}about {:.2} {unit}: {largest}", estimate.total)?;
+        }
         writeln!(f, "derived")?;
         for (population, constants) in &self.derived {
             let radius = constants.turning_radius.map_or("infinite".to_owned(), |r| format!("{r:.2} um"));
@@ -101,6 +141,7 @@ impl fmt::Display for ScenePlan {
                 constants.turning_rate, constants.omega, constants.omega_filopodia_time
             )?;
         }
+        self.plan.derived.iter().try_for_each(|derived| writeln!(f, "  {derived}"))?;
         writeln!(f, "margins")?;
         for margin in &self.plan.margins {
             let mark = if margin.is_passed() {

@@ -22,7 +22,7 @@ use serde_json::Value;
 use std::path::{Path, PathBuf};
 
 /// Resolution of pictures, dots an inch.
-const DPI: f32 = 200.0;
+pub(super) const DPI: f32 = 200.0;
 
 /// Why there are no results, or not all of them.
 #[derive(Debug, thiserror::Error)]
@@ -141,7 +141,7 @@ fn run_error(error: AssemblyError, path: &Path) -> RunError {
     }
 }
 
-fn recorder_options(loaded: &Loaded, keep_trajectories: bool) -> RecorderOptions {
+pub(super) fn recorder_options(loaded: &Loaded, keep_trajectories: bool) -> RecorderOptions {
     let (output, duration) = (&loaded.scene.output, loaded.scene.time.duration.0);
     RecorderOptions {
         trajectory_interval: keep_trajectories.then_some(output.trajectory_interval.0),

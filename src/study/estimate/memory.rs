@@ -1,0 +1,41 @@
+//! The estimate of memory: the largest resident memory of a run on one thread.
+//!
+//! What grows with the scene is told by its parts, from the sizes of their types and the lengths of their lists. The constants
+//! below are ours, measured on Linux; all together are good for a factor 1.5. More threads draw more panels at a time and take
+//! about 1 MB each besides.
+
+use super::{Estimate, Expectation, held};
+use crate::model::plan::Plan;
+use crate::model::tissue::Tissue;
+use crate::record::scene_figure::{FigureError, bytes_to_draw};
+use bevy_ecs::prelude::World;
+
+/// Bytes in a megabyte.
+const MEGABYTE: f64 = 1e6;
+/// The program, its schemas and schedules (bytes).
+const PROGRAM: f64 = 9.5e6;
+/// Meshing and setting up fields, a vertex of the mesh (bytes): most of it is given back, but stays with the process.
+const SETTING_UP: f64 = 1100.0;
+/// A row of `trajectories.csv`, as it stands in memory until it is written (bytes).
+const ROW: f64 = 80.0;
+/// A shaft vertex in a snapshot, its panel and the drawing (bytes).
+const DRAWN_VERTEX: f64 = 48.0;
+
+/// The peak of resident memory (MB) of a scene whose figure has `scale` pixels for a px.
+///
+/// # Errors
+/// A tissue without extent.
+pub fn estimate(world: &World, expected: &Expectation, scale: f64) -> Result<Estimate, FigureError> {
+    let mut estimate = held(world.resource::<Plan>(), expected);
+    let tissue = world.resource::<Tissue>();
+    estimate.add("program", PROGRAM);
+    estimate.add("mesh", SETTING_UP * tissue.mesh.vertex_count() as f64);
+    estimate.add("trajectories", ROW * expected.trajectory_points);
+    if expected.pictures > 0 {
+        let [low, high] = tissue.domain.bounding_box();
+        let drawing = bytes_to_draw(expected.pictures, [high[0] - low[0], high[1] - low[1]], scale)?;
+        estimate.add("figure", drawing + DRAWN_VERTEX * expected.drawn_vertices);
+    }
+    estimate.parts.iter_mut().for_each(|part| part.amount /= MEGABYTE);
+    Ok(estimate.summed())
+}

@@ -27,6 +27,9 @@ pub fn editor_schema(blocks: &[BlockSchema]) -> Value {
 fn loosen(schema: &mut Value, kinds: &mut Map<String, Value>) {
     match schema {
         Value::Object(keywords) => {
+            if let Some(Value::String(text)) = keywords.get_mut("description") {
+                *text = text.replace("\\[", "[").replace("\\]", "]");
+            }
             for (keyword, member) in keywords.iter_mut() {
                 if !["default", "enum", "const", "examples", "x-typical"].contains(&keyword.as_str()) {
                     loosen(member, kinds);

@@ -3,21 +3,26 @@
 //! Exit codes: 0 done; 1 a fault while solving, running or writing; 2 a bad scenario or bad arguments.
 
 use crate::model::mechanism::Roster;
+use crate::new_mechanism::{NewMechanism, NewMechanismError};
 use crate::record::manifest::Manifest;
 use crate::record::output::prepare_folder;
+use crate::scenario::catalogue::Catalogue;
+use crate::scenario::editor_schema::editor_schema;
 use crate::scenario::load::{Loaded, Request};
+use crate::scenario::schema::top_keys;
 use crate::study::ablation::{self, Extent};
 use crate::study::accuracy;
 use crate::study::chart;
 use crate::study::laboratory::Laboratory;
 use crate::study::plan::plan;
-use crate::study::run::{RunError, folder_of, simulate, write_figure, write_json, write_results};
+use crate::study::run::{RunError, block_schemas, folder_of, simulate, write_figure, write_json, write_results};
 use crate::study::seeds::{over_seeds, summarise};
 use crate::study::stability::Stability;
 use clap::{Args, Parser, Subcommand};
 use indicatif::{ProgressBar, ProgressStyle};
+use serde::Serialize;
 use std::ffi::OsString;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 /// Simulates how axons find their way: runs a scenario and writes its results into out/<scene>/.
@@ -96,6 +101,27 @@ enum Command {
         #[arg(long, value_name = "DIR", default_value = "out/stability")]
         out: PathBuf,
     },
+    /// Lists the mechanisms of this program, each with its equation and its keys: unit, ranges, default
+    Mechanisms {
+        /// Only this one; `scene` for the keys that belong to no mechanism
+        name: Option<String>,
+        /// Print the list as JSON
+        #[arg(long)]
+        json: bool,
+    },
+    /// Prints the JSON Schema of a scenario, with every mechanism in it, for editors to complete and check by
+    Schema,
+    /// Writes a crate with a mechanism of your own, which builds, runs and is tested as it is
+    NewMechanism {
+        /// Name of the mechanism and its crate: small letters, digits, underscores
+        name: String,
+        /// Folder in which the crate's folder is made
+        #[arg(long, value_name = "DIR", default_value = ".")]
+        path: PathBuf,
+        /// Sources of tropism [default: those that this program was built from]
+        #[arg(long, value_name = "PATH")]
+        tropism: Option<PathBuf>,
+    },
 }
 
 /// A scenario and what is changed in it.
@@ -140,7 +166,10 @@ const EXAMPLES: &str = "Examples:
   tropism plan scenarios/olfactory.json                  what it needs, before it runs
   tropism ablate scenarios/olfactory.json --seeds 4      without each mechanism in turn
   tropism chart scenarios/olfactory.json --only cue_field  error against time
-  tropism stability                                      where methods fail, into out/stability";
+  tropism stability                                      where methods fail, into out/stability
+  tropism mechanisms fasciculation                       its equation and its keys
+  tropism schema > scene.schema.json                     for editors; a scene says \"$schema\": \"scene.schema.json\"
+  tropism new-mechanism galvanotaxis                     a crate with a mechanism of your own";
 
 /// Runs the program with a roster of mechanisms: the whole of `main`, also for programs that add their own.
 pub fn run(arguments: impl IntoIterator<Item = impl Into<OsString> + Clone>, roster: Roster) -> ExitCode {
@@ -156,7 +185,7 @@ pub fn run(arguments: impl IntoIterator<Item = impl Into<OsString> + Clone>, ros
         Ok(code) => code,
         Err(error) => {
             eprintln!("error: {error}");
-            ExitCode::from(if matches!(error, RunError::Scenario(_)) { 2 } else { 1 })
+            ExitCode::from(if matches!(error, RunError::Scenario(_) | RunError::Arguments(_)) { 2 } else { 1 })
         }
     }
 }
@@ -189,6 +218,11 @@ fn execute(cli: &Cli, roster: &Roster) -> Result<ExitCode, RunError> {
             return run_chart(&laboratory, out.as_ref(), only);
         }
         Some(Command::Stability { out }) => return run_stability(out, roster),
+        Some(Command::Mechanisms { name, json }) => return list_mechanisms(name.as_deref(), *json, roster),
+        Some(Command::Schema) => return print_json(&editor_schema(&block_schemas(roster))),
+        Some(Command::NewMechanism { name, path, tropism }) => {
+            return new_mechanism(name, path, tropism.as_deref(), roster);
+        }
         None => {}
     }
     let loaded = cli.scene.load(roster)?;
@@ -205,12 +239,44 @@ fn execute(cli: &Cli, roster: &Roster) -> Result<ExitCode, RunError> {
 fn run_plan(scene: &SceneArguments, json: bool, roster: &Roster) -> Result<ExitCode, RunError> {
     let found = plan(&scene.load(roster)?, roster, &scene.path())?;
     if json {
-        let text = serde_json::to_string_pretty(&found).map_err(|error| RunError::Internal(error.to_string()))?;
-        println!("{text}");
-    } else {
-        print!("{found}");
-        found.notes.iter().for_each(|note| eprintln!("note: {note}"));
+        return print_json(&found);
     }
+    print!("{found}");
+    found.notes.iter().for_each(|note| eprintln!("note: {note}"));
+    Ok(ExitCode::SUCCESS)
+}
+
+fn print_json(value: &impl Serialize) -> Result<ExitCode, RunError> {
+    let text = serde_json::to_string_pretty(value).map_err(|error| RunError::Internal(error.to_string()))?;
+    println!("{text}");
+    Ok(ExitCode::SUCCESS)
+}
+
+fn list_mechanisms(name: Option<&str>, json: bool, roster: &Roster) -> Result<ExitCode, RunError> {
+    let mut found = Catalogue::of(&block_schemas(roster));
+    if let Some(name) = name {
+        found = found.only(name).map_err(RunError::Arguments)?;
+    }
+    if json {
+        return print_json(&found);
+    }
+    print!("{found}");
+    Ok(ExitCode::SUCCESS)
+}
+
+fn new_mechanism(name: &str, parent: &Path, sources: Option<&Path>, roster: &Roster) -> Result<ExitCode, RunError> {
+    let taken = top_keys(&block_schemas(roster));
+    let sources = sources.unwrap_or(Path::new(env!("CARGO_MANIFEST_DIR")));
+    let written = NewMechanism { name, parent, sources, taken: &taken }.write().map_err(|error| match error {
+        NewMechanismError::Refused(message) => RunError::Arguments(message),
+        NewMechanismError::Write(error) => RunError::Write(error),
+    })?;
+    let folder = written.folder.display();
+    println!("{folder}: {}", written.files.join(", "));
+    println!("It depends on tropism in {}, and shares what is compiled there.", written.sources.display());
+    println!("\nNext:\n  cd {folder}\n  cargo test --release");
+    println!("  cargo run --release -- scenarios/{name}.json      draws out/{name}/figure.png");
+    println!("  cargo run --release -- ablate scenarios/{name}.json --seeds 4\nThen change src/{name}.rs.");
     Ok(ExitCode::SUCCESS)
 }
 
@@ -256,7 +322,7 @@ fn run_chart(laboratory: &Laboratory, out: Option<&PathBuf>, only: &[String]) ->
     Ok(ExitCode::SUCCESS)
 }
 
-fn run_stability(folder: &std::path::Path, roster: &Roster) -> Result<ExitCode, RunError> {
+fn run_stability(folder: &Path, roster: &Roster) -> Result<ExitCode, RunError> {
     prepare_folder(folder)?;
     let bar = progress_bar();
     let maps = Stability::compute(roster, |share| bar.set_position((share * 1000.0) as u64))?;
@@ -266,7 +332,7 @@ fn run_stability(folder: &std::path::Path, roster: &Roster) -> Result<ExitCode, 
     Ok(ExitCode::SUCCESS)
 }
 
-fn run_once(cli: &Cli, roster: &Roster, loaded: &Loaded, folder: &std::path::Path) -> Result<bool, RunError> {
+fn run_once(cli: &Cli, roster: &Roster, loaded: &Loaded, folder: &Path) -> Result<bool, RunError> {
     let bar = progress_bar();
     let finished =
         simulate(loaded, roster, &cli.scene.path(), true, |share| bar.set_position((share * 1000.0) as u64))?;
@@ -297,13 +363,7 @@ fn run_once(cli: &Cli, roster: &Roster, loaded: &Loaded, folder: &std::path::Pat
     Ok(summary.complete)
 }
 
-fn run_seeds(
-    cli: &Cli,
-    roster: &Roster,
-    loaded: &Loaded,
-    folder: &std::path::Path,
-    count: u64,
-) -> Result<bool, RunError> {
+fn run_seeds(cli: &Cli, roster: &Roster, loaded: &Loaded, folder: &Path, count: u64) -> Result<bool, RunError> {
     let bar = progress_bar();
     let runs = over_seeds(loaded, roster, &cli.scene.path(), count, |share| bar.set_position((share * 1000.0) as u64))?;
     bar.finish_and_clear();

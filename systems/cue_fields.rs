@@ -84,7 +84,7 @@ keys! {
     }
 }
 
-/// The diffusible cues of a scene, by name (eq. 2).
+/// The diffusible cues of a scene, by name (eq. 2); −DΔc + kc = Σ q 1_A in Ω_M(t).
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
 #[serde(transparent)]
 pub struct Cues(pub BTreeMap<String, Cue>);

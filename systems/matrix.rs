@@ -64,7 +64,7 @@ keys! {
         pub loads: Vec<Factor> = Vec::new(),
     }
 
-    /// The deforming matrix (eq. 3): hyperelastic, moved at named edges.
+    /// The deforming matrix (eq. 3): hyperelastic, moved at named edges; −∇·P = 0, U = Û on Γ_D.
     pub struct Matrix {
         /// The material.
         pub material: MaterialLaw = MaterialLaw::StVenantKirchhoff,

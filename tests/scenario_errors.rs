@@ -162,12 +162,12 @@ fn each_bad_value_gets_its_own_sentence() {
         ),
         (
             r#"{"galvanotaxs": {}}"#,
-            "/galvanotaxs: unknown key; did you mean `galvanotaxis`? (keys here: base, name, description, seed, accuracy, space, tissue, time, growth, \
+            "/galvanotaxs: unknown key; did you mean `galvanotaxis`? (keys here: $schema, base, name, description, seed, accuracy, space, tissue, time, growth, \
              populations, targets, output, galvanotaxis)",
         ),
         (
             r#"{"galvanotaxs": null}"#,
-            "/galvanotaxs: unknown key; did you mean `galvanotaxis`? (keys here: base, name, description, seed, accuracy, space, tissue, time, growth, \
+            "/galvanotaxs: unknown key; did you mean `galvanotaxis`? (keys here: $schema, base, name, description, seed, accuracy, space, tissue, time, growth, \
              populations, targets, output, galvanotaxis)",
         ),
         (r#"{"seed": -1}"#, "/seed: -1 is outside what is possible: seed ≥ 0"),

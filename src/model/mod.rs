@@ -28,4 +28,5 @@ pub mod stopwatch;
 pub mod tissue;
 pub mod unit;
 mod unit_grammar;
+pub mod unit_pattern;
 pub mod violation;

@@ -12,9 +12,12 @@ use thiserror::Error;
 
 use super::unit_grammar::{is_non_finite_word, parse_product, split_number};
 
+/// Number of base dimensions.
+pub(super) const DIMENSIONS: usize = 6;
+
 /// The powers of length, time, concentration, pressure, voltage and angle in a unit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Dimension([i32; 6]);
+pub struct Dimension([i32; DIMENSIONS]);
 
 /// A unit: its dimension, and its size `10^ten · numerator / denominator` in base units (µm, h, nM, Pa, V, degrees).
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -77,7 +80,7 @@ pub enum UnitError {
 }
 
 /// Symbol, decimal exponent, numerator, denominator, dimension and the prefixes it takes.
-type Symbol = (&'static str, i32, f64, f64, [i32; 6], &'static str);
+type Symbol = (&'static str, i32, f64, f64, [i32; DIMENSIONS], &'static str);
 
 const DEGREES_OF_HALF_TURN: f64 = 180.0;
 
@@ -120,6 +123,11 @@ impl Unit {
     /// A [`UnitError`] naming the symbol or character at fault.
     pub fn parse(text: &str) -> Result<Self, UnitError> {
         parse_product(text.trim(), text)
+    }
+
+    /// The power of a base dimension: length, time, concentration, pressure, voltage, angle.
+    pub(super) fn power_of(&self, base: usize) -> i32 {
+        self.dimension.0[base]
     }
 
     /// The powers of the base dimensions.
@@ -198,6 +206,11 @@ pub fn parse_measure(text: &str) -> Result<(f64, Unit), UnitError> {
         None => parse_product(rest, text)?,
     };
     Ok((number, unit))
+}
+
+/// Every symbol that carries a base dimension, with the prefixes it takes.
+pub(super) fn symbols_with(base: usize) -> impl Iterator<Item = (&'static str, &'static str)> {
+    SYMBOLS.iter().filter(move |symbol| symbol.4[base] != 0).map(|symbol| (symbol.0, symbol.5))
 }
 
 /// The unit behind a symbol with or without a prefix.

@@ -23,7 +23,7 @@ use crate::model::violation::{Violation, Violations, pointer_token};
 const LONGEST_CHAIN: usize = 32;
 
 /// Keys that speak of their own file and are not taken over from a base.
-const OWN_KEYS: [&str; 3] = ["base", "name", "description"];
+const OWN_KEYS: [&str; 4] = ["$schema", "base", "name", "description"];
 
 /// What to load: a file, the mechanisms to leave out, and the keys to set.
 #[derive(Debug, Clone, Default)]
@@ -227,6 +227,7 @@ impl Draft {
         self.problems.extend(findings.problems);
         self.hints.extend(findings.hints);
         if let Some(object) = self.document.as_object_mut() {
+            object.shift_remove("$schema");
             object.shift_remove("base");
         }
     }

@@ -5,7 +5,10 @@
 //! scene ([`scene`]) by serde, and the checks that compare keys with each other ([`checks`]). [`load::load`] does all five.
 
 mod alternatives;
+pub mod catalogue;
+mod catalogue_text;
 pub mod checks;
+pub mod editor_schema;
 pub mod load;
 pub mod merge;
 pub mod overrides;

@@ -16,6 +16,9 @@ pub use super::tissue::{Outline, Ring, Tissue};
 keys! {
     /// A scene: what grows where, for how long, and what is written down. Every key has a default.
     pub struct Scene {
+        /// Where an editor finds the schema of scenes, as `tropism schema` prints it. It is not taken over from a base.
+        #[serde(rename = "$schema")]
+        pub schema: Option<String> = None,
         /// The file this one is a merge patch (RFC 7396) on, relative to this file. A base may have a base of its own.
         pub base: Option<String> = None,
         /// The name in outputs; by default the name of the file without its ending. It is not taken over from a base.

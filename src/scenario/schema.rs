@@ -73,6 +73,12 @@ pub fn full_schema(blocks: &[BlockSchema]) -> Value {
     root
 }
 
+/// The keys that can stand at the top of a scene.
+pub fn top_keys(blocks: &[BlockSchema]) -> Vec<String> {
+    let schema = full_schema(blocks);
+    schema["properties"].as_object().into_iter().flat_map(Map::keys).cloned().collect()
+}
+
 fn insert(root: &mut Value, section: &str, key: String, value: Value) {
     let Some(object) = root.as_object_mut() else { return };
     let section = object.entry(section).or_insert_with(|| Value::Object(Map::new()));

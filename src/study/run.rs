@@ -33,6 +33,9 @@ pub enum RunError {
     /// Something could not be solved before the first step.
     #[error("{0}")]
     Solve(String),
+    /// What was asked for does not exist or cannot be.
+    #[error("{0}")]
+    Arguments(String),
     /// A file could not be written.
     #[error("{0}")]
     Write(#[from] WriteError),
@@ -71,7 +74,8 @@ pub fn read_document(name: &str, value: Value, roster: &Roster) -> Result<Loaded
     load_document(name, value, &block_schemas(roster))
 }
 
-fn block_schemas(roster: &Roster) -> Vec<BlockSchema> {
+/// The schema and the checks of every mechanism of a roster.
+pub fn block_schemas(roster: &Roster) -> Vec<BlockSchema> {
     let block = |entry: &Entry| {
         let entry = *entry;
         BlockSchema::new(entry.name, (entry.schema)()).checked_by(move |value, facts| match (entry.read)(value) {

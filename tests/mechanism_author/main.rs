@@ -6,10 +6,14 @@ mod combined_signal;
 #[path = "../common/mod.rs"]
 mod common;
 mod disc_field;
+#[path = "../../examples/galvanotaxis/src/galvanotaxis.rs"]
+mod example;
 #[path = "../verification/figures.rs"]
 mod figures;
 mod front;
 mod galvanotaxis;
+#[path = "../../assets/new_mechanism/mechanism.rs"]
+mod steady_pull;
 mod trajectories;
 
 use common::{Folder, cones, ended, hash_of_states, try_load};
@@ -151,4 +155,44 @@ fn a_pull_that_is_not_finite_ends_the_run_with_one_and_keeps_what_there_is() {
     let fault = summary["fault"].as_str().unwrap();
     assert!(fault.starts_with("at t = ") && fault.contains("finite"), "{fault}");
     assert!(out.join("trajectories.csv").exists() && out.join("figure.png").exists());
+}
+
+/// The templates of `tropism new-mechanism`, the example, and the chapter that shows them.
+const LAW: &str = include_str!("../../assets/new_mechanism/mechanism.rs");
+const PROGRAM: &str = include_str!("../../assets/new_mechanism/main.rs");
+const EXAMPLE: &str = include_str!("../../examples/galvanotaxis/src/galvanotaxis.rs");
+const CHAPTER: &str = include_str!("../../docs/src/first_mechanism.md");
+
+#[test]
+fn the_code_of_the_chapter_is_the_code_of_the_template_and_of_the_example() {
+    let blocks: Vec<&str> = CHAPTER.split("```rust\n").skip(1).map(|rest| rest.split("```").next().unwrap()).collect();
+    assert_eq!(blocks.len(), 3);
+    assert_eq!(blocks[0], LAW);
+    assert!(PROGRAM.starts_with(blocks[1]) && blocks[1].contains("fn main() -> ExitCode {"));
+    assert!(EXAMPLE.contains(blocks[2]) && blocks[2].contains("impl Mechanism for Galvanotaxis {"));
+    let others = CHAPTER.matches("```rust").count();
+    assert_eq!(others, blocks.len(), "code that is not compiled");
+}
+
+#[test]
+fn the_new_mechanism_and_the_example_bend_paths_and_change_no_bit_without_weight() {
+    let roster = || systems::standard().with::<steady_pull::SteadyPull>().with::<example::Galvanotaxis>();
+    let scenes = [
+        (include_str!("../../assets/new_mechanism/scenario.json"), "steady_pull"),
+        (include_str!("../../examples/galvanotaxis/scenarios/galvanotaxis.json"), "galvanotaxis"),
+    ];
+    for (text, name) in scenes {
+        let mut scene: Value = serde_json::from_str(text).unwrap();
+        scene["time"]["duration"] = json!(8);
+        let run = |scene: &Value| ended(scene, &roster());
+        let felt = run(&scene);
+        scene[name]["weight"] = json!(0);
+        let weightless = run(&scene);
+        scene[name] = Value::Null;
+        let absent = run(&scene);
+        assert_eq!(hash_of_states(weightless.world()), hash_of_states(absent.world()), "{name}");
+        let mean = |world: &World| cones(world).iter().map(|cone| cone.position.x).sum::<f64>() / 60.0;
+        let drift = mean(felt.world()) - mean(absent.world());
+        assert!(drift > 10.0, "{name}: {drift}");
+    }
 }

@@ -1,5 +1,7 @@
 //! Everything a mechanism author needs: `use tropism::prelude::*;`.
 
+// Derive macros name these crates, and find them here.
+pub use bevy_ecs;
 pub use schemars;
 pub use serde;
 pub use serde_json;

@@ -249,7 +249,7 @@ mod tests {
     keys! {
         /// Turning along a field; L̂ += w n.
         pub struct Field {
-            /// Its strength \\[V/m\\].
+            /// Its strength \[V/m\].
             #[schemars(extend("minimum" = 0.0, "exclusiveMaximum" = 9.0, "x-typical" = [1.0, 2.0]))]
             pub strength: ElectricField = ElectricField(1.0),
             /// Electrodes.

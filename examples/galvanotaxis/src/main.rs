@@ -68,4 +68,24 @@ mod tests {
         let last = plain[plain.len() - 1];
         assert!(last[0].hypot(last[1]) > 50.0, "the path must be long enough to tell");
     }
+
+    /// The derive macros name `bevy_ecs`, which comes with the prelude.
+    mod own {
+        use tropism::prelude::*;
+
+        #[derive(Debug, PartialEq, Resource)]
+        pub struct Amplifier(pub f64);
+
+        #[derive(Debug, PartialEq, Component)]
+        pub struct Reading(pub f64);
+    }
+
+    #[test]
+    fn a_resource_and_a_component_of_its_own_take_no_other_dependency() {
+        let mut world = tropism::prelude::World::new();
+        world.insert_resource(own::Amplifier(1.0));
+        let cone = world.spawn(own::Reading(2.0)).id();
+        assert_eq!(world.resource::<own::Amplifier>(), &own::Amplifier(1.0));
+        assert_eq!(world.get::<own::Reading>(cone), Some(&own::Reading(2.0)));
+    }
 }

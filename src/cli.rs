@@ -22,6 +22,7 @@ use clap::{Args, Parser, Subcommand};
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 use std::ffi::OsString;
+use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -171,6 +172,13 @@ const EXAMPLES: &str = "Examples:
   tropism schema > scene.schema.json                     for editors; a scene says \"$schema\": \"scene.schema.json\"
   tropism new-mechanism galvanotaxis                     a crate with a mechanism of your own";
 
+/// A line on standard output. A reader that has gone (`| head`) is no fault of the run.
+macro_rules! say {
+    ($($words:tt)*) => {{
+        let _ = writeln!(std::io::stdout(), $($words)*);
+    }};
+}
+
 /// Runs the program with a roster of mechanisms: the whole of `main`, also for programs that add their own.
 pub fn run(arguments: impl IntoIterator<Item = impl Into<OsString> + Clone>, roster: Roster) -> ExitCode {
     let cli = match Cli::try_parse_from(arguments) {
@@ -232,7 +240,7 @@ fn execute(cli: &Cli, roster: &Roster) -> Result<ExitCode, RunError> {
         None => run_once(cli, roster, &loaded, &folder)?,
         Some(count) => run_seeds(cli, roster, &loaded, &folder, count)?,
     };
-    println!("results in {}", folder.display());
+    say!("results in {}", folder.display());
     Ok(ExitCode::from(u8::from(!complete)))
 }
 
@@ -241,14 +249,14 @@ fn run_plan(scene: &SceneArguments, json: bool, roster: &Roster) -> Result<ExitC
     if json {
         return print_json(&found);
     }
-    print!("{found}");
+    say!("{}", found.to_string().trim_end());
     found.notes.iter().for_each(|note| eprintln!("note: {note}"));
     Ok(ExitCode::SUCCESS)
 }
 
 fn print_json(value: &impl Serialize) -> Result<ExitCode, RunError> {
     let text = serde_json::to_string_pretty(value).map_err(|error| RunError::Internal(error.to_string()))?;
-    println!("{text}");
+    say!("{text}");
     Ok(ExitCode::SUCCESS)
 }
 
@@ -260,7 +268,7 @@ fn list_mechanisms(name: Option<&str>, json: bool, roster: &Roster) -> Result<Ex
     if json {
         return print_json(&found);
     }
-    print!("{found}");
+    say!("{}", found.to_string().trim_end());
     Ok(ExitCode::SUCCESS)
 }
 
@@ -272,11 +280,11 @@ fn new_mechanism(name: &str, parent: &Path, sources: Option<&Path>, roster: &Ros
         NewMechanismError::Write(error) => RunError::Write(error),
     })?;
     let folder = written.folder.display();
-    println!("{folder}: {}", written.files.join(", "));
-    println!("It depends on tropism in {}, and shares what is compiled there.", written.sources.display());
-    println!("\nNext:\n  cd {folder}\n  cargo test --release");
-    println!("  cargo run --release -- scenarios/{name}.json      draws out/{name}/figure.png");
-    println!("  cargo run --release -- ablate scenarios/{name}.json --seeds 4\nThen change src/{name}.rs.");
+    say!("{folder}: {}", written.files.join(", "));
+    say!("It depends on tropism in {}, and shares what is compiled there.", written.sources.display());
+    say!("\nNext:\n  cd {folder}\n  cargo test --release");
+    say!("  cargo run --release -- scenarios/{name}.json      draws out/{name}/figure.png");
+    say!("  cargo run --release -- ablate scenarios/{name}.json --seeds 4\nThen change src/{name}.rs.");
     Ok(ExitCode::SUCCESS)
 }
 
@@ -294,8 +302,8 @@ fn run_ablation(
     let found = ablation::ablate(&loaded, roster, &scene.path(), extent, tick)?;
     bar.finish_and_clear();
     ablation::report::write(&folder, &loaded, &found)?;
-    print!("{found}");
-    println!("results in {}", folder.display());
+    say!("{}", found.to_string().trim_end());
+    say!("results in {}", folder.display());
     Ok(ExitCode::from(u8::from(!found.complete)))
 }
 
@@ -308,17 +316,17 @@ fn run_chart(laboratory: &Laboratory, out: Option<&PathBuf>, only: &[String]) ->
     bar.finish_and_clear();
     chart::report::write(&folder, &chart)?;
     for factor in &chart.factors {
-        println!("{}\n  {}", factor.title, factor.advice);
+        say!("{}\n  {}", factor.title, factor.advice);
         for power in factor.growth().iter().filter(|_| factor.errors.is_empty()) {
-            println!("  time grows with the power {:.2} ({}, {} points)", power.order, power.method, power.points);
+            say!("  time grows with the power {:.2} ({}, {} points)", power.order, power.method, power.points);
         }
         for error in &factor.errors {
             for slope in factor.slopes(error) {
-                println!("  {}: order {:.2} ({}, {} points)", error.name, slope.order, slope.method, slope.points);
+                say!("  {}: order {:.2} ({}, {} points)", error.name, slope.order, slope.method, slope.points);
             }
         }
     }
-    println!("results in {}", folder.display());
+    say!("results in {}", folder.display());
     Ok(ExitCode::SUCCESS)
 }
 
@@ -328,7 +336,7 @@ fn run_stability(folder: &Path, roster: &Roster) -> Result<ExitCode, RunError> {
     let maps = Stability::compute(roster, |share| bar.set_position((share * 1000.0) as u64))?;
     bar.finish_and_clear();
     maps.write(folder)?;
-    println!("results in {}", folder.display());
+    say!("results in {}", folder.display());
     Ok(ExitCode::SUCCESS)
 }
 
@@ -340,7 +348,7 @@ fn run_once(cli: &Cli, roster: &Roster, loaded: &Loaded, folder: &Path) -> Resul
     write_results(folder, loaded, &finished)?;
     let summary = &finished.summary;
     let (counts, hits) = (&summary.counts, &summary.morphology.hits);
-    println!(
+    say!(
         "{}: t = {} h; {} axons: {} arrived, {} growing, {} stalled, {} left, {} unborn",
         summary.scene,
         summary.time,
@@ -352,7 +360,7 @@ fn run_once(cli: &Cli, roster: &Roster, loaded: &Loaded, folder: &Path) -> Resul
         counts.unborn
     );
     if let Some(fraction) = hits.fraction {
-        println!("hit fraction {fraction:.3}");
+        say!("hit fraction {fraction:.3}");
     }
     for note in &summary.notes {
         eprintln!("note: {note}");
@@ -374,10 +382,10 @@ fn run_seeds(cli: &Cli, roster: &Roster, loaded: &Loaded, folder: &Path, count: 
         first.recorder.trajectories.write(&folder.join("trajectories.csv"))?;
         write_figure(folder, loaded, &first.recorder.snapshots)?;
     }
-    println!("{}: {count} seeds; mean [95 % bootstrap interval]", summary.scene);
+    say!("{}: {count} seeds; mean [95 % bootstrap interval]", summary.scene);
     for (name, value) in &summary.measures {
         let interval = value.low.zip(value.high).map_or(String::new(), |(l, h)| format!(" [{l:.4}, {h:.4}]"));
-        println!("  {name}: {:.4}{interval}", value.mean);
+        say!("  {name}: {:.4}{interval}", value.mean);
     }
     Ok(summary.complete)
 }

@@ -27,6 +27,16 @@ pub enum Release {
     Total,
 }
 
+/// What moves a cue.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Transport {
+    /// It diffuses: in equilibrium with its sources at every instant.
+    Diffusing,
+    /// It is bound to the matrix: distributed as at rest, then carried by the tissue and diluted by it, c = c₀/J.
+    Bound,
+}
+
 /// How the degradation term is integrated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
@@ -71,6 +81,8 @@ keys! {
         pub release_rate: Option<ReleaseRate> = None,
         /// What stays the same of the release while the tissue deforms. Ours.
         pub release: Release = Release::PerArea,
+        /// What moves it once the tissue deforms. Ours.
+        pub transport: Transport = Transport::Diffusing,
         /// How degradation is integrated. Absent: `lumped` for linear elements, `consistent` for quadratic ones, which know no
         /// other. Ours.
         pub mass: Option<Mass> = None,
@@ -107,6 +119,10 @@ impl Mechanism for Cues {
             let lumped = cue.element == Element::Quadratic && cue.mass == Some(Mass::Lumped);
             wrong.demand(!lumped, &format!("/{name}/mass"), || {
                 "quadratic elements have no lumped mass (it would be zero at the vertices); leave `mass` out, or take linear elements".into()
+            });
+            let bound = cue.transport == Transport::Bound && cue.element == Element::Quadratic;
+            wrong.demand(!bound, &format!("/{name}/element"), || {
+                "a cue that is bound to the matrix takes linear elements".into()
             });
             for (i, shape) in cue.sources.iter().enumerate() {
                 if let Err(found) = shape.check() {
@@ -330,6 +346,7 @@ fn problem<'m>(tissue: &Tissue, (name, cue): (&str, &Cue), mesh: &'m SimplexMesh
         gradient,
         sources: (0..cue.sources.len()).map(cells).collect(),
         release_rate: cue.release_rate.map_or(50.0 * cue.degradation.0, |q| q.0),
+        bound: cue.transport == Transport::Bound,
         keeps_total: cue.release == Release::Total,
     }
 }

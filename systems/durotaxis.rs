@@ -141,7 +141,7 @@ mod tests {
         let at = |slope: f64| Stiffness { value: 500.0, gradient: Vector3::x() * slope };
         assert_eq!(law.pull(&at(0.9)), Vector3::zeros());
         assert!((law.pull(&at(1.8)) + Vector3::x() * 0.5).norm() < 1e-15);
-        assert!((law.pull(&at(-9.0)) - 0.9 * Vector3::x()).norm() < 1e-15);
+        assert!((law.pull(&at(-9.0)) - Vector3::x() * 0.9).norm() < 1e-15);
     }
 
     #[test]

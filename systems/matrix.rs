@@ -10,6 +10,7 @@ use crate::numerics::hermite::Interpolation as Course;
 use crate::numerics::hyperelasticity::{Body, Prescribed};
 use crate::numerics::load_path::{LoadPath, LoadPathOptions};
 use crate::numerics::material::{Lame, Material, NeoHookean, StVenantKirchhoff};
+use crate::numerics::ogden::Ogden;
 use crate::prelude::*;
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -22,6 +23,8 @@ pub enum MaterialLaw {
     StVenantKirchhoff,
     /// Neo-Hookean, ours: stays well-posed in compression.
     NeoHookean,
+    /// Ogden with one term, ours: stiffens or softens as `ogden_exponent` says; neo-Hookean with an exponent of 2.
+    Ogden,
 }
 
 /// What an edge does sideways while it moves.
@@ -68,6 +71,9 @@ keys! {
     pub struct Matrix {
         /// The material.
         pub material: MaterialLaw = MaterialLaw::StVenantKirchhoff,
+        /// Exponent α of the principal stretches, with `ogden` only. Brain tissue: −20 to −5. Absent: 8. Ours.
+        #[schemars(extend("x-typical" = [-20.0, 20.0]))]
+        pub ogden_exponent: Option<Factor> = None,
         /// Young's modulus E. It drops out of displacements when only motion is imposed. Source: embryonic mesoderm.
         #[schemars(extend("exclusiveMinimum" = 0.0, "x-typical" = [100.0, 3000.0]))]
         pub young_modulus: Pressure = Pressure(500.0),
@@ -119,6 +125,7 @@ impl Matrix {
         Ok(match self.material {
             MaterialLaw::StVenantKirchhoff => Arc::new(StVenantKirchhoff { lame }),
             MaterialLaw::NeoHookean => Arc::new(NeoHookean { lame }),
+            MaterialLaw::Ogden => Arc::new(Ogden { lame, exponent: self.ogden_exponent.map_or(8.0, |alpha| alpha.0) }),
         })
     }
 
@@ -178,6 +185,10 @@ impl Mechanism for Matrix {
         for name in self.edges().keys().filter(|name| !facts.edges.contains(name)) {
             wrong.push("/motion", unknown_name("edge", name, &facts.edges));
         }
+        let only_ogden = self.ogden_exponent.is_none() || self.material == MaterialLaw::Ogden;
+        wrong.demand(only_ogden, "/ogden_exponent", || "only the material `ogden` has an exponent".into());
+        let zero = self.ogden_exponent.is_some_and(|alpha| alpha.0 == 0.0);
+        wrong.demand(!zero, "/ogden_exponent", || "an exponent of zero has no energy; 2 is neo-Hookean".into());
         let LoadCurve { times, loads } = &self.load;
         wrong.demand(times.len() == loads.len() && times.len() != 1, "/load", || {
             format!("{} times and {} loads: give as many loads as times, two or more", times.len(), loads.len())
@@ -268,7 +279,9 @@ fn remedy(matrix: &Matrix) -> &'static str {
         MaterialLaw::StVenantKirchhoff => {
             ". St. Venant-Kirchhoff fails in compression; `\"material\": \"neo_hookean\"` goes further, as does less motion"
         }
-        MaterialLaw::NeoHookean => ". Less motion, sliding instead of held edges, or a finer mesh may help",
+        MaterialLaw::NeoHookean | MaterialLaw::Ogden => {
+            ". Less motion, sliding instead of held edges, or a finer mesh may help"
+        }
     }
 }
 

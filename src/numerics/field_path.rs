@@ -5,6 +5,7 @@
 
 use std::sync::Arc;
 
+use crate::numerics::carried_field::carried;
 use crate::numerics::delaunay::Monotonicity;
 use crate::numerics::element_gradient::{MovingField, averaged_gradients, corner_gradients, linear_gradients};
 use crate::numerics::field_layout::FieldLayout;
@@ -123,6 +124,8 @@ pub struct FieldProblem<'m> {
     pub sources: Vec<Vec<u32>>,
     /// Release q (nM/h), at rest.
     pub release_rate: f64,
+    /// Whether the field is bound to the matrix: solved at rest, then carried and diluted by it (linear elements only).
+    pub bound: bool,
     /// Whether q times the source's area is kept while the tissue deforms; else q is.
     pub keeps_total: bool,
 }
@@ -217,21 +220,27 @@ impl FieldProblem<'_> {
         motion: Option<&[[f64; 2]]>,
     ) -> Result<Level, ReactionDiffusionError> {
         let (solver, recovery) = solvers.linear()?;
-        let system = solver.system(&self.equation, at)?;
-        let sources = self.sources_at(at, motion);
-        let (c, slope) = match motion {
-            Some(motion) => system.solve_with_rate(motion, &sources)?,
-            None => (system.solve(&sources)?, vec![0.0; at.len()]),
+        let carried_by = motion.filter(|_| self.bound);
+        let here = if carried_by.is_some() { self.mesh.vertices() } else { at };
+        let system = solver.system(&self.equation, here)?;
+        let sources = self.sources_at(here, motion);
+        let (c, slope) = match (motion, carried_by) {
+            (_, Some(motion)) => carried(self.mesh, &system.solve(&sources)?, at, motion),
+            (Some(motion), None) => system.solve_with_rate(motion, &sources)?,
+            (None, None) => (system.solve(&sources)?, vec![0.0; at.len()]),
         };
+        // What is carried may have a slope across the border.
+        let no_flux = carried_by.is_none();
         let (gradient, gradient_slope) = match (self.gradient, motion) {
             (Gradient::Raw, _) => {
                 let still = vec![[0.0; 2]; at.len()];
                 let velocity = motion.unwrap_or(&still);
                 linear_gradients(self.mesh, &MovingField { coordinates: at, velocity, values: &c, rates: &slope })
             }
-            (Gradient::Recovered, None) => (recovery.recover(at, &c, true), vec![[0.0; 2]; at.len()]),
+            (Gradient::Recovered, None) => (recovery.recover(at, &c, no_flux), vec![[0.0; 2]; at.len()]),
             (Gradient::Recovered, Some(motion)) => {
-                (recovery.recover(at, &c, true), recovered_slope(recovery, (at, motion), (&c, &slope)))
+                let rate = recovered_slope(recovery, (at, motion), (&c, &slope), no_flux);
+                (recovery.recover(at, &c, no_flux), rate)
             }
         };
         let found = (layout.pack(&c, &gradient), layout.pack(&slope, &gradient_slope));
@@ -281,6 +290,7 @@ fn recovered_slope(
     recovery: &GradientRecovery<2>,
     (at, motion): (&[[f64; 2]], &[[f64; 2]]),
     (c, slope): (&[f64], &[f64]),
+    no_flux: bool,
 ) -> Vec<[f64; 2]> {
     let fastest = motion.iter().flatten().fold(0.0f64, |m, w| m.max(w.abs()));
     if fastest == 0.0 {
@@ -291,7 +301,7 @@ fn recovered_slope(
         let e = sign * step;
         let x: Vec<[f64; 2]> = at.iter().zip(motion).map(|(x, w)| [x[0] + e * w[0], x[1] + e * w[1]]).collect();
         let value: Vec<f64> = c.iter().zip(slope).map(|(c, dc)| c + e * dc).collect();
-        recovery.recover(&x, &value, true)
+        recovery.recover(&x, &value, no_flux)
     };
     let (ahead, behind) = rayon::join(|| shifted(1.0), || shifted(-1.0));
     ahead.iter().zip(&behind).map(|(a, b)| [0, 1].map(|k| (a[k] - b[k]) / (2.0 * step))).collect()

@@ -182,23 +182,30 @@ pub fn principal_stretches<const D: usize>(gradient: &Tensor<D>) -> [f64; D] {
     symmetric_eigenvalues(gradient.transpose() * gradient).map(|square| square.max(0.0).sqrt())
 }
 
-/// Eigenvalues of a symmetric tensor, ascending, by Jacobi's rotations (exact after one for `D = 2`).
-fn symmetric_eigenvalues<const D: usize>(mut tensor: Tensor<D>) -> [f64; D] {
-    const SWEEPS: usize = 12;
-    for _ in 0..SWEEPS {
-        for p in 0..D {
-            for q in p + 1..D {
-                annihilate(&mut tensor, p, q);
-            }
-        }
-    }
-    let mut eigenvalues: [f64; D] = std::array::from_fn(|i| tensor[(i, i)]);
+/// Eigenvalues of a symmetric tensor, ascending.
+fn symmetric_eigenvalues<const D: usize>(tensor: Tensor<D>) -> [f64; D] {
+    let (mut eigenvalues, _) = eigen_decomposition(tensor);
     eigenvalues.sort_by(f64::total_cmp);
     eigenvalues
 }
 
-/// One Jacobi rotation, after which entry `(p, q)` is zero.
-fn annihilate<const D: usize>(tensor: &mut Tensor<D>, p: usize, q: usize) {
+/// Eigenvalues of a symmetric tensor, in no order, and unit eigenvectors as columns, by Jacobi's rotations (exact after one for
+/// `D = 2`).
+pub(crate) fn eigen_decomposition<const D: usize>(mut tensor: Tensor<D>) -> ([f64; D], Tensor<D>) {
+    const SWEEPS: usize = 12;
+    let mut vectors = Tensor::identity();
+    for _ in 0..SWEEPS {
+        for p in 0..D {
+            for q in p + 1..D {
+                annihilate(&mut tensor, &mut vectors, p, q);
+            }
+        }
+    }
+    (std::array::from_fn(|i| tensor[(i, i)]), vectors)
+}
+
+/// One Jacobi rotation, after which entry `(p, q)` is zero; the vectors turn with it.
+fn annihilate<const D: usize>(tensor: &mut Tensor<D>, vectors: &mut Tensor<D>, p: usize, q: usize) {
     let off = tensor[(p, q)];
     if off == 0.0 {
         return;
@@ -212,6 +219,7 @@ fn annihilate<const D: usize>(tensor: &mut Tensor<D>, p: usize, q: usize) {
     rotation[(p, q)] = tangent * cosine;
     rotation[(q, p)] = -tangent * cosine;
     *tensor = rotation.transpose() * *tensor * rotation;
+    *vectors *= rotation;
     tensor[(p, q)] = 0.0;
     tensor[(q, p)] = 0.0;
 }

@@ -1,6 +1,7 @@
 //! The mathematics: meshes, finite elements, turning law. Knows no ECS, no JSON, no files.
 
 pub mod arrangement;
+pub mod carried_field;
 pub mod contact_integral;
 mod cue_element;
 pub mod delaunay;
@@ -18,6 +19,7 @@ pub mod locate;
 pub mod material;
 pub mod mesh_grading;
 pub mod newton;
+pub mod ogden;
 pub mod planar_domain;
 pub mod polygon;
 pub mod polylines;

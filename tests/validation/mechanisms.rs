@@ -133,6 +133,23 @@ fn a_mechanism_without_strength_changes_no_bit() {
     assert_ne!(base(json!({ "bending_stiffness": {} })), without);
 }
 
+#[test]
+fn a_bound_cue_is_the_diffusing_one_at_rest_and_another_one_in_a_stretched_tissue() {
+    let disc = json!({ "disc": { "centre": [500, 700], "radius": 80 } });
+    let state = |transport: &str, outward: f64| {
+        let edge = json!({ "outward": outward });
+        let blocks = json!({
+            "matrix": { "motion": { "top": edge, "bottom": edge } },
+            "cues": { "netrin": { "transport": transport, "sources": [disc] } },
+            "chemotaxis": { "receptors": { "netrin": {} } }
+        });
+        let axons = [([300.0, 200.0], 90.0, 0.0), ([600.0, 300.0], 80.0, 0.0)];
+        hash_of_states(ended(&scene(&axons, 20.0, 0.1, blocks), &roster()).world())
+    };
+    assert_eq!(state("bound", 0.0), state("diffusing", 0.0));
+    assert_ne!(state("bound", 0.1), state("diffusing", 0.1));
+}
+
 /// A measure of a scenario of the repository over its first seeds, with some keys set and mechanisms left out.
 fn measured(name: &str, without: &[&str], set: &[&str], pick: impl Fn(&Value) -> f64) -> f64 {
     let seeds = 2;

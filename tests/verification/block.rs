@@ -5,6 +5,7 @@ use std::sync::Arc;
 use serde_json::Value;
 use tropism::numerics::hyperelasticity::{Body, Prescribed};
 use tropism::numerics::material::{Lame, Material, NeoHookean, StVenantKirchhoff};
+use tropism::numerics::ogden::Ogden;
 use tropism::numerics::simplex_mesh::{SimplexMesh, structured_rectangle};
 
 pub const WIDTH: f64 = 1.5;
@@ -16,6 +17,10 @@ pub fn svk(poisson: f64) -> Arc<dyn Material<2>> {
 
 pub fn neo_hookean(poisson: f64) -> Arc<dyn Material<2>> {
     Arc::new(NeoHookean { lame: Lame::from_young_poisson(1.0, poisson).unwrap() })
+}
+
+pub fn ogden(poisson: f64) -> Arc<dyn Material<2>> {
+    Arc::new(Ogden { lame: Lame::from_young_poisson(1.0, poisson).unwrap(), exponent: -8.0 })
 }
 
 /// `columns` must be even, so that a vertex stands at `(W/2, 0)`.

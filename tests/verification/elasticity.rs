@@ -9,7 +9,9 @@ use tropism::numerics::newton::{Equilibrium, NewtonOptions, equilibrium};
 use tropism::numerics::runge_kutta::RK4;
 use tropism::numerics::simplex_mesh::SimplexMesh;
 
-use crate::block::{HEIGHT, WIDTH, array, block, moved_ends, neo_hookean, number, reaction_of_the_top, reference, svk};
+use crate::block::{
+    HEIGHT, WIDTH, array, block, moved_ends, neo_hookean, number, ogden, reaction_of_the_top, reference, svk,
+};
 
 fn matrix(value: &Value) -> Matrix2<f64> {
     Matrix2::from_fn(|i, k| number(&value[i][k]))
@@ -138,7 +140,7 @@ fn a_homogeneous_state_is_found_exactly_on_a_distorted_mesh_by_both_materials() 
         }
     }
     for poisson in [0.3, 0.45] {
-        for material in [svk(poisson), neo_hookean(poisson)] {
+        for material in [svk(poisson), neo_hookean(poisson), ogden(poisson)] {
             let body = Body::new(&mesh, material.clone(), prescribed.clone()).unwrap();
             let path = LoadPath::solve(&body, &LoadPathOptions::default()).unwrap();
             let mut u = vec![0.0; body.unknowns()];
@@ -163,7 +165,7 @@ fn a_homogeneous_state_is_found_exactly_on_a_distorted_mesh_by_both_materials() 
 fn a_rigid_rotation_costs_nothing() {
     let forms = reference("closed_forms.json");
     let mesh = distorted_block();
-    for material in [svk(0.3), neo_hookean(0.3)] {
+    for material in [svk(0.3), neo_hookean(0.3), ogden(0.3)] {
         let body = moved_ends(&mesh, material, 0.2, true);
         for degrees in array(&forms["rigid_rotation"]["angles_deg"]).iter().map(number) {
             let strain = rotation(degrees) - Matrix2::identity();
@@ -184,7 +186,7 @@ fn the_observer_may_turn_without_changing_the_stress() {
     for poisson in [0.3, 0.45] {
         let wanted = matrix(&forms["objectivity"]["P_QF"][&poisson.to_string()]);
         assert!((svk(poisson).stress(&(turn * gradient)) - wanted).norm() < 1e-14);
-        for material in [svk(poisson), neo_hookean(poisson)] {
+        for material in [svk(poisson), neo_hookean(poisson), ogden(poisson)] {
             let turned = turn * gradient;
             close(material.energy(&turned), material.energy(&gradient), 1e-15, "energy");
             assert!((material.stress(&turned) - turn * material.stress(&gradient)).norm() < 1e-14);

@@ -268,7 +268,7 @@ fn new_mechanism(name: &str, parent: &Path, sources: Option<&Path>, roster: &Ros
     })?;
     let folder = written.folder.display();
     println!("{folder}: {}", written.files.join(", "));
-    println!("It depends on tropism in {}, and shares what is compiled there.", written.sources.display());
+    println!("It depends on tropism in {}, and shares the dependencies compiled there.", written.sources.display());
     println!("\nNext:\n  cd {folder}\n  cargo test --release");
     println!("  cargo run --release -- scenarios/{name}.json      draws out/{name}/figure.png");
     println!("  cargo run --release -- ablate scenarios/{name}.json --seeds 4\nThen change src/{name}.rs.");

@@ -281,7 +281,7 @@ fn new_mechanism(name: &str, parent: &Path, sources: Option<&Path>, roster: &Ros
     })?;
     let folder = written.folder.display();
     say!("{folder}: {}", written.files.join(", "));
-    say!("It depends on tropism in {}, and shares what is compiled there.", written.sources.display());
+    say!("It depends on tropism in {}, and shares the dependencies compiled there.", written.sources.display());
     say!("\nNext:\n  cd {folder}\n  cargo test --release");
     say!("  cargo run --release -- scenarios/{name}.json      draws out/{name}/figure.png");
     say!("  cargo run --release -- ablate scenarios/{name}.json --seeds 4\nThen change src/{name}.rs.");

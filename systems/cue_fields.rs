@@ -373,7 +373,7 @@ fn tell_margins(plan: &mut Plan, name: &str, problem: &FieldProblem, field: &Fie
         let why = "quadratic elements do not keep it on any mesh";
         return plan.leave_out(format!("cue `{name}`: discrete maximum principle"), why);
     };
-    plan.compare(
+    plan.bound(
         format!("cue `{name}`: Delaunay, largest angles that face an edge over pi"),
         monotonicity.angles,
         1.0,

@@ -25,9 +25,14 @@ pub struct Margin {
     pub value: f64,
     /// The largest value that is advised.
     pub limit: f64,
+    /// Share of the limit beyond which little is left.
+    pub thin_from: f64,
     /// What to do when it is too near.
     pub advice: String,
 }
+
+/// Beyond three quarters of a limit little is left; of one that sound scenes come near to, beyond the whole.
+const THIN: f64 = 0.75;
 
 impl Margin {
     /// Whether the limit is passed.
@@ -35,15 +40,15 @@ impl Margin {
         self.value > self.limit
     }
 
-    /// Whether less than a quarter of the limit is left.
+    /// Whether little of the limit is left.
     pub fn is_thin(&self) -> bool {
-        self.value > 0.75 * self.limit
+        self.value > self.thin_from * self.limit
     }
 }
 
 impl fmt::Display for Margin {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { name, value, limit, advice } = self;
+        let Self { name, value, limit, advice, .. } = self;
         write!(f, "{name}: {value:.3}; {limit:.3} or less is advised ({advice})")
     }
 }
@@ -161,7 +166,12 @@ impl Plan {
 
     /// Notes a quantity with its limit.
     pub fn compare(&mut self, name: impl Into<String>, value: f64, limit: f64, advice: impl Into<String>) {
-        self.margins.push(Margin { name: name.into(), value, limit, advice: advice.into() });
+        self.margins.push(Margin { name: name.into(), value, limit, thin_from: THIN, advice: advice.into() });
+    }
+
+    /// Notes a quantity that sound scenes bring near to its limit: only passing it counts.
+    pub fn bound(&mut self, name: impl Into<String>, value: f64, limit: f64, advice: impl Into<String>) {
+        self.margins.push(Margin { name: name.into(), value, limit, thin_from: 1.0, advice: advice.into() });
     }
 
     /// Notes a number that follows from the keys, with its unit.
@@ -186,7 +196,7 @@ mod tests {
 
     #[test]
     fn a_margin_is_thin_before_it_is_passed() {
-        let margin = |value| Margin { name: "x".into(), value, limit: 2.0, advice: "less".into() };
+        let margin = |value| Margin { name: "x".into(), value, limit: 2.0, thin_from: THIN, advice: "less".into() };
         let seen = [1.0, 1.6, 2.0, 2.1].map(|value| (margin(value).is_thin(), margin(value).is_passed()));
         assert_eq!(seen, [(false, false), (true, false), (true, false), (true, true)]);
         assert_eq!(margin(2.1).to_string(), "x: 2.100; 2.000 or less is advised (less)");

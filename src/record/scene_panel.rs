@@ -272,9 +272,16 @@ fn label_target(svg: &mut Svg, panel: &Panel, view: &View) {
         return;
     };
     let (font, colour, text) = (Font::regular(theme::SMALL), theme::TEXT, "target");
-    let end = corner(&view.place_all(&panel.vertices), f64::max).map_or(right, |tissue| tissue[0]);
-    let fits = right + 4.0 + font.width(text) <= end;
-    let (x, anchor) = if fits { (right + 4.0, Anchor::Start) } else { (left - 4.0, Anchor::End) };
+    let tissue = view.place_all(&panel.vertices);
+    let side = |choose, of_target: f64| corner(&tissue, choose).map_or(of_target, |tissue| tissue[0]);
+    let room = 4.0 + font.width(text);
+    let (x, anchor) = if right + room <= side(f64::max, right) {
+        (right + 4.0, Anchor::Start)
+    } else if left - room >= side(f64::min, left) {
+        (left - 4.0, Anchor::End)
+    } else {
+        (0.5 * (left + right), Anchor::Middle)
+    };
     let at = [x, 0.5 * (top + bottom) + 0.35 * font.size];
     svg.label(&Label { at, anchor, font, colour, halo: true, text });
 }

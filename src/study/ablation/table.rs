@@ -21,7 +21,6 @@ impl Ablation {
             wanted.push(("like neighbours", format!("heights.{last}.like_neighbours")));
         }
         wanted.push(("length [um]", "length_um.mean".to_owned()));
-        wanted.push(("straightness", "straightness.mean".to_owned()));
         wanted.push(("turning [deg]", "turning_angle_deg.mean".to_owned()));
         let column = |(heading, measure): (&'static str, String)| {
             let means = self.arms.iter().filter_map(|arm| arm.measures.get(&measure)).map(|found| found.mean.abs());

@@ -12,7 +12,7 @@
 use crate::prelude::*;
 
 keys! {
-    /// Growth faster up a gradient and slower down it; v ← v (1 + σ clip₁(a K_d ∇c·e_g/(K_d + c)²/0.025)).
+    /// Growth faster up a gradient and slower down it; v = v₀ (1 + σ clip₁(a K_d ∇c·e_g/(K_d + c)²/0.025)).
     pub struct GrowthRateModulation {
         /// The cue that is read.
         pub cue: String = String::new(),

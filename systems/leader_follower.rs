@@ -18,7 +18,7 @@ use crate::prelude::*;
 use std::collections::BTreeMap;
 
 keys! {
-    /// Slowing of leaders, not of followers, in decision regions; v ← v f for a cone that feels no shaft ahead.
+    /// Slowing of leaders, not of followers, in decision regions; v = f v₀ for a cone that feels no shaft ahead.
     pub struct LeaderFollower {
         /// The decision regions, by name.
         pub regions: BTreeMap<String, Shape> = BTreeMap::new(),

@@ -25,6 +25,18 @@ fn complete_scene() -> Value {
     })
 }
 
+/// The complete scene with every other mechanism of the roster in it.
+fn every_mechanism() -> Value {
+    let mut scene = complete_scene();
+    let band = [[0, 30], [300, 30], [300, 90], [0, 90]];
+    scene["growth_rate_modulation"] = json!({ "cue": "attractant" });
+    scene["steric_repulsion"] = json!({ "distance": "8 um" });
+    scene["leader_follower"] = json!({ "regions": { "midline": { "polygon": { "points": band } } } });
+    scene["durotaxis"] = json!({ "profile": [[0, 200], [300, 800]] });
+    scene["bending_stiffness"] = json!({});
+    scene
+}
+
 fn without_block(name: &str) -> Value {
     let mut scene = complete_scene();
     assert!(scene.as_object_mut().unwrap().remove(name).is_some(), "the complete scene has no `{name}`");
@@ -37,9 +49,9 @@ fn simulated(loaded: &Loaded) -> Simulation {
     simulation
 }
 
-/// Mechanisms that others need: without its cues, chemotaxis goes too.
+/// Mechanisms that others need: without its cues, what reads them goes too.
 fn with_dependants(name: &'static str) -> Vec<&'static str> {
-    if name == "cues" { vec!["cues", "chemotaxis"] } else { vec![name] }
+    if name == "cues" { vec!["cues", "chemotaxis", "growth_rate_modulation"] } else { vec![name] }
 }
 
 fn counters(scene: &Value) -> Counters {
@@ -49,13 +61,13 @@ fn counters(scene: &Value) -> Counters {
 #[test]
 fn leaving_a_mechanism_out_gives_the_bits_of_a_scene_without_its_block() {
     let roster = systems::standard();
-    let complete = hash_of_states(simulated(&loaded(&complete_scene(), &roster)).world());
+    let complete = hash_of_states(simulated(&loaded(&every_mechanism(), &roster)).world());
     for name in roster.names() {
         let left_out = with_dependants(name);
-        let mut scene = complete_scene();
+        let mut scene = every_mechanism();
         left_out.iter().for_each(|name| drop(scene.as_object_mut().unwrap().remove(*name)));
         let never_there = loaded(&scene, &roster);
-        let taken_out = try_load(&complete_scene(), &roster, &left_out, &[]).unwrap();
+        let taken_out = try_load(&every_mechanism(), &roster, &left_out, &[]).unwrap();
         let [(path, state), (other_path, other_state)] = [&never_there, &taken_out].map(|loaded| {
             let (trajectories, simulation) = observed(loaded, &roster);
             (trajectories, hash_of_states(simulation.world()))
@@ -81,7 +93,7 @@ fn a_merge_patch_with_null_is_the_same_ablation() {
 fn births_are_the_same_draws_whatever_is_left_out() {
     let roster = systems::standard();
     let births = |left_out: &[&str]| {
-        let loaded = try_load(&complete_scene(), &roster, left_out, &[]).unwrap();
+        let loaded = try_load(&every_mechanism(), &roster, left_out, &[]).unwrap();
         let simulation = Simulation::assemble(&loaded, &roster).unwrap();
         let world = simulation.world();
         let mut origins = world.try_query::<&tropism::model::births::Origin>().unwrap();

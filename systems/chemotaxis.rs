@@ -8,6 +8,7 @@ use super::cue_fields::{CueFields, CueSample, Cues};
 use crate::model::components::ReceptorWeights;
 use crate::model::cones::ConesWith;
 use crate::model::observables::{Effect as Seen, Observables};
+use crate::numerics::piecewise::value_and_slope;
 use crate::prelude::*;
 use std::collections::BTreeMap;
 
@@ -183,7 +184,7 @@ impl Availability {
     /// Availability in [0, 1] at a time (h) of its own clock.
     pub fn at(&self, time: f64) -> f64 {
         if !self.table.is_empty() {
-            return interpolate(&self.table, time);
+            return value_and_slope(&self.table, time).map_or(1.0, |(value, _)| value);
         }
         let rise = |from: f64| {
             if self.width.0 > 0.0 { logistic((time - from) / self.width.0) } else { f64::from(time >= from) }
@@ -194,15 +195,6 @@ impl Availability {
 
 fn logistic(x: f64) -> f64 {
     1.0 / (1.0 + (-x).exp())
-}
-
-fn interpolate(table: &[[f64; 2]], x: f64) -> f64 {
-    let above = table.partition_point(|pair| pair[0] <= x);
-    match (above.checked_sub(1).map(|i| table[i]), table.get(above)) {
-        (Some(low), Some(high)) => low[1] + (high[1] - low[1]) * (x - low[0]) / (high[0] - low[0]),
-        (Some(end), None) | (None, Some(&end)) => end[1],
-        (None, None) => 1.0,
-    }
 }
 
 /// A receptor bound to the numbers of its cues.
@@ -220,12 +212,7 @@ struct Receptors(Vec<Bound>);
 
 fn bind_receptors(world: &mut World) -> Result<(), InstallError> {
     let law = world.resource::<Law<Chemotaxis>>();
-    let fields = world.get_resource::<CueFields>();
-    let number = |name: &String| {
-        fields.and_then(|fields| fields.index(name)).ok_or_else(|| {
-            InstallError::Scenario(Violation::new(format!("/receptors/{name}"), "this cue has no field"))
-        })
-    };
+    let number = |name: &String| CueFields::number(world, name, &format!("/receptors/{name}"));
     let mut bound = Vec::new();
     for (name, receptor) in &law.receptors {
         let mut silencing = Vec::new();
@@ -313,10 +300,7 @@ impl Sense {
         match self.sensing {
             Sensing::Direction if size * self.length > self.threshold * c => gradient / size,
             Sensing::Direction => Vector3::zeros(),
-            Sensing::Occupancy => {
-                let total = dissociation + c;
-                gradient * (self.length * dissociation / (total * total * OCCUPANCY_REFERENCE))
-            }
+            Sensing::Occupancy => sample.occupancy_difference(dissociation, self.length),
             Sensing::SignalToNoise if c > 0.0 => {
                 let occupied = 1.0 + c / dissociation;
                 let noise = (1.0 / (c * dissociation * occupied.powi(3))).sqrt();
@@ -326,9 +310,6 @@ impl Sense {
         }
     }
 }
-
-/// a K_d |∇c| / (K_d + c)² at 10 % per 10 µm across 10 µm and c = K_d.
-const OCCUPANCY_REFERENCE: f64 = 0.025;
 
 #[cfg(test)]
 mod tests {

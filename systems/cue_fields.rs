@@ -173,6 +173,18 @@ pub struct CueSample {
     pub gradient: Vector3<f64>,
 }
 
+/// a K_d |∇c|/(K_d + c)² at 10 % per 10 µm across 10 µm and c = K_d.
+const OCCUPANCY_REFERENCE: f64 = 0.025;
+
+impl CueSample {
+    /// The difference in receptor occupancy across a cone of length a (µm) with dissociation constant K_d (nM), along each
+    /// axis, a K_d ∇c/(K_d + c)², over its size at 10 % per 10 µm across 10 µm and c = K_d.
+    pub fn occupancy_difference(&self, dissociation: f64, length: f64) -> Vector3<f64> {
+        let total = dissociation + self.concentration;
+        self.gradient * (length * dissociation / (total * total * OCCUPANCY_REFERENCE))
+    }
+}
+
 /// What is solved before the run, and shared by runs whose tissue, matrix and demanded cues are equal.
 #[derive(Debug, Default)]
 struct Solved {
@@ -199,6 +211,15 @@ impl CueFields {
     /// Number of a cue, under which it is sampled.
     pub fn index(&self, cue: &str) -> Option<usize> {
         self.names.iter().position(|name| name == cue)
+    }
+
+    /// [`Self::index`] once all fields are solved; `pointer` is the place that names the cue.
+    ///
+    /// # Errors
+    /// A cue that has no field.
+    pub fn number(world: &World, cue: &str, pointer: &str) -> Result<usize, InstallError> {
+        let number = world.get_resource::<Self>().and_then(|fields| fields.index(cue));
+        number.ok_or_else(|| InstallError::Scenario(Violation::new(pointer, "this cue has no field")))
     }
 
     /// Concentration and gradient of cue `index` at a site.
@@ -357,7 +378,7 @@ const LENIENCE: f64 = 1.2;
 /// Compares the mesh with the decay length ℓ = √(D/k), of which an edge should take a quarter (half of it with quadratic elements,
 /// whose nodes are twice as close), and with what the discrete maximum principle asks for.
 fn tell_margins(plan: &mut Plan, name: &str, problem: &FieldProblem, field: &FieldPath) {
-    let decay_length = (problem.equation.diffusion / problem.equation.degradation).sqrt();
+    let decay_length = problem.equation.decay_length();
     plan.derive(format!("cue `{name}`: decay length"), decay_length, "um");
     let edge = mean_edge(problem.mesh);
     let (share, words) = if problem.order == Order::Linear { (0.25, "a quarter") } else { (0.5, "half") };

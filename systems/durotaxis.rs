@@ -12,6 +12,7 @@
 //! sin θ / v is kept across a step of stiffness, θ the angle to its normal: Snell's law (Oliveri, Franze and Goriely, Phys. Rev. Lett.
 //! 126, 2021, doi:10.1103/PhysRevLett.126.118101).
 
+use crate::numerics::piecewise::value_and_slope;
 use crate::prelude::*;
 
 keys! {
@@ -72,15 +73,7 @@ pub struct Stiffness {
 impl Durotaxis {
     /// E (Pa) and dE/ds (Pa/µm) at a place s (µm) along the direction; constant beyond the ends of the profile.
     pub fn along(&self, place: f64) -> (f64, f64) {
-        let after = self.profile.partition_point(|pair| pair[0] <= place);
-        match (after.checked_sub(1).map(|i| self.profile[i]), self.profile.get(after)) {
-            (Some([from, low]), Some([to, high])) => {
-                let slope = (high - low) / (to - from);
-                (low + slope * (place - from), slope)
-            }
-            (Some([_, end]), None) | (None, Some(&[_, end])) => (end, 0.0),
-            (None, None) => (self.reference.0, 0.0),
-        }
+        value_and_slope(&self.profile, place).unwrap_or((self.reference.0, 0.0))
     }
 
     /// The pull (dimensionless) toward soft.

@@ -61,11 +61,10 @@ impl Mechanism for Fasciculation {
     }
 
     fn install(self, model: &mut ModelBuilder) -> Result<(), InstallError> {
-        let populations = &model.world.resource::<Populations>().0;
-        if populations.iter().map(|population| population.count).sum::<usize>() < 2 {
-            model.plan().leave_out("shaft index", "an axon alone has no neighbours");
+        if !ShaftIndex::install(model, self.reach.0, self.neighbours) {
             return Ok(());
         }
+        let populations = &model.world.resource::<Populations>().0;
         let table = AdhesionTable::new(&self.adhesion, populations);
         let fastest = populations.iter().map(|population| population.speed).fold(0.0, f64::max);
         let clock = model.world.resource::<Clock>();
@@ -79,7 +78,6 @@ impl Mechanism for Fasciculation {
         );
         plan.keep("shaft index", format!("fasciculation feels shafts within {} um", self.reach.0));
         model.pulls_up_to(self.weight.0);
-        ShaftIndex::install(model, self.reach.0, self.neighbours);
         model.insert(table).insert_law(self).term(Term::Contact, attract);
         Ok(())
     }
@@ -133,9 +131,8 @@ pub struct ContactLaw {
 
 impl From<&Fasciculation> for ContactLaw {
     fn from(law: &Fasciculation) -> Self {
-        let cos_sector = if law.sector.0 >= 180.0 { -2.0 } else { law.sector.radians().cos() };
         Self {
-            felt: Felt { reach: law.reach.0, cos_sector },
+            felt: Felt::ahead(law.reach.0, law.sector.radians()),
             attraction: law.attraction.0,
             alignment: law.alignment.0,
             follow_backwards: law.follow_backwards,
@@ -168,10 +165,7 @@ fn attract(
     let asking = Asking::all(&cones);
     counters.neighbour_queries += asking.len() as u64;
     let pulls = index.for_each(&scene, &asking, |contacts: &mut Contacts<2>, cone, segments| {
-        let state = (cone.position.xy().into(), cone.heading.xy().into());
-        let adhesion = table.row(cone.population);
-        let [x, y] = contacts.sum(state, segments, cone.index, (&contact.felt, &contact), adhesion);
-        let sum = Vector3::new(x, y, 0.0);
+        let sum = cone.sum(contacts, segments, (&contact.felt, &contact), table.row(cone.population));
         sum / sum.norm().max(1.0)
     });
     cones.add_pulls(&pulls, law.weight.0);

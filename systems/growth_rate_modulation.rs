@@ -9,6 +9,7 @@
 //!
 //! s the difference in receptor occupancy between front and back over its value at 10 % per 10 µm and c = K_d. κ is held.
 
+use super::cue_fields::Cues;
 use crate::prelude::*;
 
 keys! {
@@ -28,9 +29,6 @@ keys! {
     }
 }
 
-/// a K_d |∇c|/(K_d + c)² at 10 % per 10 µm across 10 µm and c = K_d.
-const REFERENCE: f64 = 0.025;
-
 /// Number of the cue among the fields.
 #[derive(Debug, Resource)]
 struct Read(usize);
@@ -40,7 +38,7 @@ impl Mechanism for GrowthRateModulation {
 
     fn check(&self, facts: &Facts) -> Violations {
         let mut wrong = Violations::new();
-        let cues = facts.names_in("cues");
+        let cues = facts.names_in(Cues::NAME);
         wrong.demand(cues.contains(&self.cue), "/cue", || unknown_name("cue", &self.cue, &cues));
         wrong
     }
@@ -49,9 +47,7 @@ impl Mechanism for GrowthRateModulation {
         CueFields::demand(model, &self.cue);
         let cue = self.cue.clone();
         model.insert_law(self).term(Term::Sample, modulate).at_end(move |world| {
-            let number = world.get_resource::<CueFields>().and_then(|fields| fields.index(&cue));
-            let number =
-                number.ok_or_else(|| InstallError::Scenario(Violation::new("/cue", "this cue has no field")))?;
+            let number = CueFields::number(world, &cue, "/cue")?;
             world.insert_resource(Read(number));
             Ok(())
         });
@@ -62,10 +58,8 @@ impl Mechanism for GrowthRateModulation {
 impl GrowthRateModulation {
     /// The factor on the speed of a cone with unit `heading` that senses `sample`.
     pub fn factor(&self, sample: CueSample, heading: Vector3<f64>) -> f64 {
-        let (half, along) = (self.dissociation_constant.0, sample.gradient.dot(&heading));
-        let total = half + sample.concentration;
-        let sensed = self.sensing_length.0 * half * along / (total * total * REFERENCE);
-        1.0 + self.strength.0 * sensed.clamp(-1.0, 1.0)
+        let sensed = sample.occupancy_difference(self.dissociation_constant.0, self.sensing_length.0);
+        1.0 + self.strength.0 * sensed.dot(&heading).clamp(-1.0, 1.0)
     }
 }
 

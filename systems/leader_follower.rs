@@ -64,8 +64,13 @@ impl Mechanism for LeaderFollower {
         for name in self.regions.keys() {
             tissue.regions.get(&region(name)).into_iter().flatten().for_each(|&cell| cells[cell as usize] = true);
         }
-        ShaftIndex::install(model, self.reach.0, Search::Tree);
-        model.insert(DecisionCells(cells)).insert_law(self).term(Term::Contact, slow_leaders);
+        let followed = ShaftIndex::install(model, self.reach.0, Search::Tree);
+        model.insert(DecisionCells(cells)).insert_law(self);
+        if followed {
+            model.term(Term::Contact, slow_leaders);
+        } else {
+            model.term(Term::Contact, slow_alone);
+        }
         Ok(())
     }
 }
@@ -90,8 +95,7 @@ impl<const D: usize> ContactPull<D> for Ahead {
 
 impl From<&LeaderFollower> for Ahead {
     fn from(law: &LeaderFollower) -> Self {
-        let cos_sector = if law.sector.0 >= 180.0 { -2.0 } else { law.sector.radians().cos() };
-        Self { felt: Felt { reach: law.reach.0, cos_sector } }
+        Self { felt: Felt::ahead(law.reach.0, law.sector.radians()) }
     }
 }
 
@@ -109,13 +113,18 @@ fn slow_leaders(
 ) {
     let ahead = Ahead::from(&law.0);
     let factors = index.for_each(&scene, &Asking::all(&cones), |contacts: &mut Contacts<2>, cone, segments| {
-        let state = (cone.position.xy().into(), cone.heading.xy().into());
         let inside = cells.0[cone.site.cell as usize];
-        let felt =
-            if inside { contacts.sum(state, segments, cone.index, (&ahead.felt, &ahead), &[1.0])[0] } else { 0.0 };
+        let felt = if inside { cone.sum(contacts, segments, (&ahead.felt, &ahead), &[1.0]).x } else { 0.0 };
         factor(law.leader_speed.0, inside, felt)
     });
     cones.apply(&factors, |spring, factor| spring.speed_factor *= factor);
+}
+
+/// An axon alone leads.
+fn slow_alone(law: Res<Law<LeaderFollower>>, cells: Res<DecisionCells>, mut cones: Cones) {
+    cones.for_each(|cone, spring| {
+        spring.speed_factor *= factor(law.leader_speed.0, cells.0[cone.site.cell as usize], 0.0);
+    });
 }
 
 #[cfg(test)]

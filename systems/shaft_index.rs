@@ -13,9 +13,10 @@
 
 use crate::model::births::Origin;
 use crate::model::shafts::BLOCK;
+use crate::numerics::contact_integral::Felt;
 use crate::numerics::locate::MaterialPoint;
 use crate::numerics::polylines::{Part, Polyline, meeting};
-use crate::numerics::segments::Segments;
+use crate::numerics::segments::{ContactPull, Contacts, Segments};
 use crate::prelude::*;
 use nalgebra::Vector2;
 use rayon::prelude::*;
@@ -94,6 +95,20 @@ impl Asking {
             heading: spring.heading,
         })
     }
+
+    /// What the cone makes of segments other than its own by a law, times its adhesion to their kinds.
+    #[inline]
+    pub fn sum(
+        &self,
+        contacts: &mut Contacts<2>,
+        segments: &Segments<2>,
+        felt_by: (&Felt, &impl ContactPull<2>),
+        adhesion: &[f64],
+    ) -> Vector3<f64> {
+        let state = (self.position.xy().into(), self.heading.xy().into());
+        let [x, y] = contacts.sum(state, segments, self.index, felt_by, adhesion);
+        Vector3::new(x, y, 0.0)
+    }
 }
 
 /// The neighbour index over all shaft segments.
@@ -142,8 +157,15 @@ impl Places {
 
 impl ShaftIndex {
     /// Puts the index into a model for mechanisms that look `reach` far (µm); the farthest counts, and one that wants
-    /// to look at everything.
-    pub fn install(model: &mut ModelBuilder, reach: f64, search: Search) {
+    /// to look at everything. Returns whether there is anything to be found: an axon alone has no neighbours, and gets no index.
+    pub fn install(model: &mut ModelBuilder, reach: f64, search: Search) -> bool {
+        if model.world.resource::<Shafts>().count() < 2 {
+            let mut plan = model.plan();
+            if !plan.parts.iter().any(|part| part.name == PART) {
+                plan.leave_out(PART, "an axon alone has no neighbours");
+            }
+            return false;
+        }
         match model.world.get_resource_mut::<ShaftIndex>() {
             Some(mut index) => {
                 index.reach = index.reach.max(reach);
@@ -155,6 +177,7 @@ impl ShaftIndex {
                 model.phase(Phase::Neighbours, index_new_vertices);
             }
         }
+        true
     }
 
     /// Calls `act` for each cone with all segments that may lie within `reach` of it, those of its own shaft included, and

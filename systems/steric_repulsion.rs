@@ -30,9 +30,10 @@ impl Mechanism for StericRepulsion {
     const NAME: &'static str = "steric_repulsion";
 
     fn install(self, model: &mut ModelBuilder) -> Result<(), InstallError> {
-        model.pulls_up_to(self.weight.0);
-        ShaftIndex::install(model, self.distance.0, Search::Tree);
-        model.insert_law(self).term(Term::Contact, repel);
+        if ShaftIndex::install(model, self.distance.0, Search::Tree) {
+            model.pulls_up_to(self.weight.0);
+            model.insert_law(self).term(Term::Contact, repel);
+        }
         Ok(())
     }
 }
@@ -47,7 +48,7 @@ pub struct Repulsion {
 impl Repulsion {
     /// Repulsion below a distance (µm).
     pub fn below(distance: f64) -> Self {
-        Self { felt: Felt { reach: distance, cos_sector: -2.0 } }
+        Self { felt: Felt::around(distance) }
     }
 }
 
@@ -63,9 +64,7 @@ impl<const D: usize> ContactPull<D> for Repulsion {
 fn repel(law: Res<Law<StericRepulsion>>, mut index: ResMut<ShaftIndex>, scene: ShaftScene, mut cones: Cones) {
     let contact = Repulsion::below(law.distance.0);
     let pulls = index.for_each(&scene, &Asking::all(&cones), |contacts: &mut Contacts<2>, cone, segments| {
-        let state = (cone.position.xy().into(), cone.heading.xy().into());
-        let [x, y] = contacts.sum(state, segments, cone.index, (&contact.felt, &contact), &[1.0]);
-        let sum = Vector3::new(x, y, 0.0);
+        let sum = cone.sum(contacts, segments, (&contact.felt, &contact), &[1.0]);
         sum / sum.norm().max(1.0)
     });
     cones.add_pulls(&pulls, law.weight.0);

@@ -17,7 +17,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use tropism::prelude::Roster;
 use tropism::scenario::load::Request;
 use tropism::study::accuracy::find;
-use tropism::study::laboratory::{Laboratory, cones, root_mean_square, run_until};
+use tropism::study::laboratory::{Laboratory, chaotic, cones, root_mean_square, run_until};
 use tropism::systems;
 
 const REPETITIONS: usize = 3;
@@ -151,7 +151,6 @@ fn summarise(rows: &[Row]) {
 /// A scene to measure.
 struct Bench<'a> {
     laboratory: Laboratory<'a>,
-    without: Vec<&'static str>,
     /// Keys besides mesh size and step that were found.
     others: Vec<String>,
     duration: f64,
@@ -175,7 +174,7 @@ fn measured(number: u64, folder: &Path) -> Row {
     let others: Vec<String> =
         found.set.iter().filter(|key| !key.contains("mesh_size=") && !key.contains("step=")).cloned().collect();
     let duration = scene["time"]["duration"].as_f64().expect("a duration");
-    let bench = Bench { laboratory, without: vec!["fasciculation", "heading_noise"], others, duration };
+    let bench = Bench { laboratory, others, duration };
     let (reference, finer) = bench.reference(chosen, asked, &scene);
     let (tips, seconds) = bench.run(chosen, &[]);
     let reached = error(&tips, &reference);
@@ -207,8 +206,7 @@ impl Bench<'_> {
         set.push(format!("/tissue/mesh_size={:e}", fixed.mesh));
         set.push(format!("/time/step={:e}", fixed.step));
         set.extend(more.iter().cloned());
-        let present = self.laboratory.scene().expect("a scene").blocks;
-        let without: Vec<&str> = self.without.iter().copied().filter(|name| present.contains_key(*name)).collect();
+        let without = chaotic(&self.laboratory.scene().expect("a scene"));
         let loaded = self.laboratory.load(&without, &set).expect("a scene");
         let start = cpu_seconds();
         let mut simulation = self.laboratory.assemble(&loaded).expect("a simulation");

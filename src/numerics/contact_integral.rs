@@ -14,6 +14,8 @@
 //!
 //! Every function takes one segment and has no branches, so that a loop over columns of segments runs in vector registers.
 
+use std::f64::consts::PI;
+
 /// A segment as a cone sees it.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Sight {
@@ -66,6 +68,16 @@ struct Parts {
 }
 
 impl Felt {
+    /// What lies within `reach` (µm) and within the angle `half_angle` (rad) of the heading; from π on, all around.
+    pub fn ahead(reach: f64, half_angle: f64) -> Self {
+        Self { reach, cos_sector: if half_angle >= PI { -2.0 } else { half_angle.cos() } }
+    }
+
+    /// What lies within `reach` (µm), all around.
+    pub fn around(reach: f64) -> Self {
+        Self::ahead(reach, PI)
+    }
+
     /// How much of a segment is felt.
     #[inline(always)]
     pub fn view(&self, sight: &Sight) -> View {

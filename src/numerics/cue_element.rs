@@ -28,6 +28,13 @@ pub struct ReactionDiffusion {
     pub mass: Mass,
 }
 
+impl ReactionDiffusion {
+    /// Decay length ℓ = √(D/k) (µm).
+    pub fn decay_length(&self) -> f64 {
+        (self.diffusion / self.degradation).sqrt()
+    }
+}
+
 /// Geometry of one cell.
 pub(crate) struct Element<'a, const D: usize> {
     pub(crate) corners: &'a [u32],

@@ -99,6 +99,15 @@ impl<'m> FieldSolvers<'m> {
     }
 }
 
+/// A field of linear elements in one configuration, one entry a vertex.
+struct Nodal {
+    c: Vec<f64>,
+    /// Its derivative along the motion of the vertices; zeros if they do not move.
+    slope: Vec<f64>,
+    flipped: bool,
+    edges: Option<Monotonicity>,
+}
+
 /// A field at one load.
 struct Level {
     /// c and ∇c, with their derivatives along a motion of the vertices, if they move.
@@ -165,11 +174,13 @@ impl FieldProblem<'_> {
         goal: Refinement,
     ) -> Result<FieldPath, FieldPathError> {
         let layout = self.layout(solvers)?;
+        let bound = configurations.filter(|_| self.bound);
+        let at_rest = bound.map(|_| self.nodal(solvers, self.mesh.vertices(), None)).transpose()?;
         let (mut flipped_from, mut monotonicity) = (None::<f64>, None::<Monotonicity>);
         let defect = |a: &[f64], b: &[f64]| layout.gradient_defect(self.mesh, (a, b), FLAT);
         let mut level = |load: f64, at: &[[f64; 2]], motion: Option<&[[f64; 2]]>| {
             let Level { found, flipped, edges } = match self.order {
-                Order::Linear => self.linear_level(solvers, &layout, at, motion)?,
+                Order::Linear => self.linear_level(solvers, &layout, (at, motion), at_rest.as_ref())?,
                 Order::Quadratic => self.quadratic_level(solvers, &layout, at, motion)?,
             };
             if flipped {
@@ -197,10 +208,9 @@ impl FieldProblem<'_> {
     /// A field that cannot be solved.
     pub fn gradient_errors(&self, solvers: &mut FieldSolvers) -> Result<Vec<f64>, FieldPathError> {
         let rest = self.mesh.vertices();
-        let (solver, recovery) = solvers.linear()?;
-        let c = solver.system(&self.equation, rest)?.solve(&self.sources_at(rest, None))?;
-        let decay_length = (self.equation.diffusion / self.equation.degradation).sqrt();
-        Ok(gradient_errors(self.mesh, &c, &recovery.recover(rest, &c, true), decay_length))
+        let Nodal { c, .. } = self.nodal(solvers, rest, None)?;
+        let (_, recovery) = solvers.linear()?;
+        Ok(gradient_errors(self.mesh, &c, &recovery.recover(rest, &c, true), self.equation.decay_length()))
     }
 
     fn layout(&self, solvers: &mut FieldSolvers) -> Result<FieldLayout, ReactionDiffusionError> {
@@ -212,25 +222,40 @@ impl FieldProblem<'_> {
         })
     }
 
+    /// Solves for linear elements in a configuration whose vertices may move.
+    fn nodal(
+        &self,
+        solvers: &mut FieldSolvers,
+        at: &[[f64; 2]],
+        motion: Option<&[[f64; 2]]>,
+    ) -> Result<Nodal, ReactionDiffusionError> {
+        let system = solvers.linear()?.0.system(&self.equation, at)?;
+        let sources = self.sources_at(at, motion);
+        let (c, slope) = match motion {
+            Some(motion) => system.solve_with_rate(motion, &sources)?,
+            None => (system.solve(&sources)?, vec![0.0; at.len()]),
+        };
+        let edges = system.edge_report().map(|report| report.monotonicity);
+        Ok(Nodal { c, slope, flipped: system.is_flipped(), edges })
+    }
+
+    /// The level of a field that diffuses, or of a bound one that is carried from `at_rest`.
     fn linear_level(
         &self,
         solvers: &mut FieldSolvers,
         layout: &FieldLayout,
-        at: &[[f64; 2]],
-        motion: Option<&[[f64; 2]]>,
+        (at, motion): (&[[f64; 2]], Option<&[[f64; 2]]>),
+        at_rest: Option<&Nodal>,
     ) -> Result<Level, ReactionDiffusionError> {
-        let (solver, recovery) = solvers.linear()?;
-        let carried_by = motion.filter(|_| self.bound);
-        let here = if carried_by.is_some() { self.mesh.vertices() } else { at };
-        let system = solver.system(&self.equation, here)?;
-        let sources = self.sources_at(here, motion);
-        let (c, slope) = match (motion, carried_by) {
-            (_, Some(motion)) => carried(self.mesh, &system.solve(&sources)?, at, motion),
-            (Some(motion), None) => system.solve_with_rate(motion, &sources)?,
-            (None, None) => (system.solve(&sources)?, vec![0.0; at.len()]),
+        let (Nodal { c, slope, flipped, edges }, no_flux) = match at_rest.zip(motion) {
+            Some((&Nodal { ref c, flipped, edges, .. }, motion)) => {
+                let (c, slope) = carried(self.mesh, c, at, motion);
+                // What is carried may have a slope across the border.
+                (Nodal { c, slope, flipped, edges }, false)
+            }
+            None => (self.nodal(solvers, at, motion)?, true),
         };
-        // What is carried may have a slope across the border.
-        let no_flux = carried_by.is_none();
+        let (_, recovery) = solvers.linear()?;
         let (gradient, gradient_slope) = match (self.gradient, motion) {
             (Gradient::Raw, _) => {
                 let still = vec![[0.0; 2]; at.len()];
@@ -244,8 +269,7 @@ impl FieldProblem<'_> {
             }
         };
         let found = (layout.pack(&c, &gradient), layout.pack(&slope, &gradient_slope));
-        let edges = system.edge_report().map(|report| report.monotonicity);
-        Ok(Level { found, flipped: system.is_flipped(), edges })
+        Ok(Level { found, flipped, edges })
     }
 
     fn quadratic_level(

@@ -20,6 +20,7 @@ pub mod material;
 pub mod mesh_grading;
 pub mod newton;
 pub mod ogden;
+pub mod piecewise;
 pub mod planar_domain;
 pub mod polygon;
 pub mod polylines;

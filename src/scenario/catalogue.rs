@@ -6,7 +6,7 @@ use serde_json::Value;
 
 use super::ranges::{Range, typical, with_unit};
 use super::schema::{BlockSchema, full_schema};
-use super::schema_view::{branches_of, describe, kind_of, resolve, types_of, words_of};
+use super::schema_view::{branches_of, describe, kind_of, resolve, types_of, unescaped, words_of};
 use super::suggest::advice;
 use crate::model::quantity::format_number;
 
@@ -219,7 +219,7 @@ impl List<'_> {
 fn documentation(schema: &Value) -> String {
     let text = schema.get("description").and_then(Value::as_str).unwrap_or_default();
     let first = text.split("\n\n").next().unwrap_or_default();
-    first.split_whitespace().collect::<Vec<_>>().join(" ").replace("\\[", "[").replace("\\]", "]")
+    unescaped(&first.split_whitespace().collect::<Vec<_>>().join(" "))
 }
 
 /// Longer defaults are left out, longer numbers rounded.

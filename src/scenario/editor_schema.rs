@@ -8,7 +8,7 @@
 use serde_json::{Map, Value, json};
 
 use super::schema::{BlockSchema, full_schema};
-use super::schema_view::{kind_of, words_of};
+use super::schema_view::{kind_of, unescaped, words_of};
 use crate::model::quantity::Kind;
 use crate::model::unit_pattern::pattern_of;
 
@@ -28,7 +28,7 @@ fn loosen(schema: &mut Value, kinds: &mut Map<String, Value>) {
     match schema {
         Value::Object(keywords) => {
             if let Some(Value::String(text)) = keywords.get_mut("description") {
-                *text = text.replace("\\[", "[").replace("\\]", "]");
+                *text = unescaped(text);
             }
             for (keyword, member) in keywords.iter_mut() {
                 if !["default", "enum", "const", "examples", "x-typical"].contains(&keyword.as_str()) {

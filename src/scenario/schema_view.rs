@@ -12,6 +12,11 @@ const SHOWN_CHARACTERS: usize = 60;
 /// References are followed this far; a chain that is longer leads nowhere.
 const LONGEST_REFERENCE: usize = 32;
 
+/// The text of a documentation comment without the escapes that rustdoc wants.
+pub(super) fn unescaped(text: &str) -> String {
+    text.replace("\\[", "[").replace("\\]", "]")
+}
+
 /// The schema a `$ref` leads to, with the keywords beside the `$ref` on top.
 pub(super) fn resolve<'s>(root: &'s Value, schema: &'s Value) -> Cow<'s, Value> {
     let mut beside = Vec::new();

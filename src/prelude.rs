@@ -23,12 +23,14 @@ pub use crate::model::health::{Counters, Health};
 pub use crate::model::mechanism::{Demands, Facts, InstallError, Law, Mechanism, ModelBuilder, Roster, unknown_name};
 pub use crate::model::plan::{Each, Plan, Work};
 pub use crate::model::quantity::{
-    Angle, AngularSpeed, Area, Concentration, ConcentrationGradient, Diffusivity, ElectricField, Factor, Gradient,
-    Kind, Length, Pressure, Quantity, Rate, ReleaseRate, Speed, StiffnessGradient, Time,
+    Angle, AngularSpeed, Area, Concentration, ConcentrationGradient, Diffusivity, Drag, ElectricField,
+    ElongationalViscosity, Factor, Force, Gradient, Kind, Length, Pressure, Quantity, Rate, ReleaseRate, Speed,
+    StiffnessGradient, Time,
 };
 pub use crate::model::random::{KeyedRng, Stream};
+pub use crate::model::remodel::{Place, Remodelling, Standing};
 pub use crate::model::schedule::{Phase, Term};
-pub use crate::model::shafts::{Shafts, Successor, VertexId};
+pub use crate::model::shafts::{ShaftPoint, Shafts, Successor, VertexId};
 pub use crate::model::shape::{Point, Shape};
 pub use crate::model::shelf::Shelf;
 pub use crate::model::tissue::{Configuration, Tissue};

@@ -2,6 +2,7 @@
 
 pub mod bending_stiffness;
 pub mod borders;
+pub mod branching;
 pub mod chemotaxis;
 pub mod cue_fields;
 pub mod durotaxis;
@@ -10,8 +11,10 @@ pub mod growth_rate_modulation;
 pub mod heading_noise;
 pub mod leader_follower;
 pub mod matrix;
+pub mod retraction;
 pub mod shaft_index;
 pub mod steric_repulsion;
+pub mod zippering;
 
 use crate::model::mechanism::Roster;
 
@@ -29,4 +32,7 @@ pub fn standard() -> Roster {
         .with::<durotaxis::Durotaxis>()
         .with::<bending_stiffness::BendingStiffness>()
         .with::<heading_noise::HeadingNoise>()
+        .with::<retraction::Retraction>()
+        .with::<branching::Branching>()
+        .with::<zippering::Zippering>()
 }

@@ -12,7 +12,7 @@
 //! shaft, to the last bit.
 
 use crate::model::births::Origin;
-use crate::model::shafts::BLOCK;
+use crate::model::shafts::{BLOCK, Struck};
 use crate::numerics::contact_integral::Felt;
 use crate::numerics::locate::MaterialPoint;
 use crate::numerics::polylines::{Part, Polyline, meeting};
@@ -155,6 +155,17 @@ impl Places {
     }
 }
 
+impl Places {
+    /// Forgets where a block and the one before it were, whose end it may have been.
+    fn forget(&mut self, block: u32, shafts: &Shafts) {
+        for block in [Some(block), shafts.block_before(block)].into_iter().flatten() {
+            if let Some(revision) = self.revisions.get_mut(block as usize) {
+                *revision = 0;
+            }
+        }
+    }
+}
+
 impl ShaftIndex {
     /// Puts the index into a model for mechanisms that look `reach` far (µm); the farthest counts, and one that wants
     /// to look at everything. Returns whether there is anything to be found: an axon alone has no neighbours, and gets no index.
@@ -173,6 +184,7 @@ impl ShaftIndex {
             }
             None => {
                 tell(model, reach);
+                model.world.resource_mut::<Shafts>().watch();
                 model.insert(ShaftIndex { search, reach, ..ShaftIndex::default() });
                 model.phase(Phase::Neighbours, index_new_vertices);
             }
@@ -277,6 +289,16 @@ impl ShaftIndex {
 
     fn add(&mut self, vertex: VertexId, at: [f64; 2], longest: f64) {
         self.tree.insert(Entry::new(at, vertex));
+        self.each_list_near(at, longest, |list| name(list, vertex));
+    }
+
+    fn forget(&mut self, vertex: VertexId, at: [f64; 2], longest: f64) {
+        self.tree.remove(&Entry::new(at, vertex));
+        self.each_list_near(at, longest, |list| unname(list, vertex));
+    }
+
+    /// The lists of all squares that a vertex with reference position `at` may be near to.
+    fn each_list_near(&mut self, at: [f64; 2], longest: f64, mut act: impl FnMut(&mut Vec<Part>)) {
         let side = SIDE * self.reach;
         let margin = self.radius + longest;
         let low = square(Vector3::new(at[0] - margin, at[1] - margin, 0.0), side);
@@ -284,7 +306,7 @@ impl ShaftIndex {
         for x in low[0]..=high[0] {
             for y in low[1]..=high[1] {
                 if let Some(list) = self.lists.get_mut(&[x, y]) {
-                    name(list, vertex);
+                    act(list);
                 }
             }
         }
@@ -333,6 +355,17 @@ fn name(list: &mut Vec<Part>, vertex: VertexId) {
     match list.binary_search_by_key(&block, |(other, _)| *other) {
         Ok(at) => list[at].1 |= bit,
         Err(at) => list.insert(at, (block, bit)),
+    }
+}
+
+/// Takes a vertex out of a list.
+fn unname(list: &mut Vec<Part>, vertex: VertexId) {
+    let (block, bit) = (vertex / BLOCK as u32, 1 << (vertex as usize % BLOCK));
+    if let Ok(at) = list.binary_search_by_key(&block, |(other, _)| *other) {
+        list[at].1 &= !bit;
+        if list[at].1 == 0 {
+            list.remove(at);
+        }
     }
 }
 
@@ -398,6 +431,11 @@ fn index_new_vertices(
     mut index: ResMut<ShaftIndex>,
     mut counters: ResMut<Counters>,
 ) {
+    for Struck { vertex, point } in shafts.take_struck() {
+        let at = tissue.reference_position(point.into());
+        index.forget(vertex, [at.x, at.y], shafts.longest);
+        index.places.forget(vertex / BLOCK as u32, &shafts);
+    }
     for vertex in shafts.take_laid() {
         let at = tissue.reference_position(shafts.point(vertex).into());
         index.add(vertex, [at.x, at.y], shafts.longest);

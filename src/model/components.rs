@@ -48,6 +48,10 @@ pub enum Status {
     Arrived,
     /// Gone across the border (`on_border: leave`).
     Left,
+    /// Drawing back along its shaft.
+    Retracting,
+    /// Drawn back to where it began, for good.
+    Withdrawn,
 }
 
 impl Status {
@@ -59,6 +63,8 @@ impl Status {
             Status::Stalled => "stalled",
             Status::Arrived => "arrived",
             Status::Left => "left",
+            Status::Retracting => "retracting",
+            Status::Withdrawn => "withdrawn",
         }
     }
 }

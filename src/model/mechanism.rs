@@ -40,6 +40,11 @@ pub trait Mechanism: DeserializeOwned + JsonSchema + Send + Sync + 'static {
         Vec::new()
     }
 
+    /// Growth cones that each axon may need besides its own, for branches.
+    fn spare_cones(&self) -> u32 {
+        0
+    }
+
     /// How wrong what it solves on the mesh of a tissue at rest is estimated to be, one number a cell; none where it solves nothing.
     /// Asked only by a scene that refines its mesh.
     ///
@@ -250,6 +255,7 @@ fn after<S: SystemSet + Copy>(
 pub(crate) trait Installable {
     fn check(&self, facts: &Facts) -> Violations;
     fn outlines(&self) -> Vec<(String, Shape)>;
+    fn spare_cones(&self) -> u32;
     fn mesh_errors(&self, tissue: &Tissue) -> Result<Vec<f64>, InstallError>;
     fn install(self: Box<Self>, model: &mut ModelBuilder) -> Result<(), InstallError>;
 }
@@ -261,6 +267,10 @@ impl<M: Mechanism> Installable for M {
 
     fn outlines(&self) -> Vec<(String, Shape)> {
         Mechanism::outlines(self)
+    }
+
+    fn spare_cones(&self) -> u32 {
+        Mechanism::spare_cones(self)
     }
 
     fn mesh_errors(&self, tissue: &Tissue) -> Result<Vec<f64>, InstallError> {

@@ -227,6 +227,18 @@ quantity! {
     StiffnessGradient, "stiffness gradient", "Pa/um"
 }
 quantity! {
+    /// A force \[pN\].
+    Force, "force", "pN"
+}
+quantity! {
+    /// A drag: force over speed \[pN·h/µm\].
+    Drag, "drag", "pN*h/um"
+}
+quantity! {
+    /// An elongational viscosity: force over rate of elongation \[pN·h\].
+    ElongationalViscosity, "elongational viscosity", "pN*h"
+}
+quantity! {
     /// An electric field \[V/m\], which is also mV/mm.
     ElectricField, "electric field", "V/m"
 }
@@ -244,7 +256,7 @@ quantity! {
 }
 
 /// The kinds by which a unit of the wrong dimension is named.
-const KINDS: [Kind<'static>; 16] = [
+const KINDS: [Kind<'static>; 19] = [
     Factor::KIND,
     Length::KIND,
     Time::KIND,
@@ -257,6 +269,9 @@ const KINDS: [Kind<'static>; 16] = [
     Gradient::KIND,
     Pressure::KIND,
     StiffnessGradient::KIND,
+    Force::KIND,
+    Drag::KIND,
+    ElongationalViscosity::KIND,
     ElectricField::KIND,
     Angle::KIND,
     AngularSpeed::KIND,

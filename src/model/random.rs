@@ -3,7 +3,7 @@
 //! A draw is a function of (seed, axon, stream, index). There is no state to carry or to save: it does not matter in which
 //! order axons are visited, on how many threads, after which resume, or which other mechanisms are switched off.
 
-use rand::TryRng;
+use rand::{RngExt, TryRng};
 use std::convert::Infallible;
 
 const MULTIPLIERS: [u32; 2] = [0xD251_1F53, 0xCD9E_8D57];
@@ -58,6 +58,11 @@ impl KeyedRng {
         let key = [seed as u32, (seed >> 32) as u32];
         let counter = [(index << 8) as u32, (index >> 24) as u32, axon, stream.0];
         Self { key, counter, block: [0; 4], used: 4 }
+    }
+
+    /// The next number, evenly spread in [0, 1).
+    pub fn share(&mut self) -> f64 {
+        self.random()
     }
 
     fn next_word(&mut self) -> u32 {

@@ -6,6 +6,7 @@
 //! grow without moving others and parts can later be struck out. A planar vertex takes 24 bytes.
 
 use super::components::Site;
+use super::open_end::OpenEnd;
 use crate::numerics::locate::MaterialPoint;
 use bevy_ecs::prelude::Resource;
 
@@ -23,18 +24,6 @@ pub enum Successor {
     Vertex(VertexId),
     /// The live tip of the shaft.
     Tip(u32),
-}
-
-/// The part of a shaft between its last stored vertex and its tip: the directions in which the tip may go on without
-/// the chord leaving the tolerance.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-struct OpenEnd {
-    anchor: [f64; 2],
-    tip: [f64; 2],
-    axis: [f64; 2],
-    low: f64,
-    high: f64,
-    far: f64,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -61,7 +50,27 @@ pub struct Shafts {
     before: Vec<u32>,
     owner: Vec<u32>,
     chains: Vec<Chain>,
+    watched: bool,
     laid: Vec<VertexId>,
+    struck: Vec<Struck>,
+}
+
+/// A vertex that is no longer there, and the material point it was.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Struck {
+    /// Its number, which another vertex may have by now.
+    pub vertex: VertexId,
+    /// Where it was.
+    pub point: MaterialPoint<2>,
+}
+
+/// A point of a shaft that is laid anew: its site, and when the cone passed it (h).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ShaftPoint {
+    /// Material site.
+    pub site: Site,
+    /// Time (h).
+    pub time: f32,
 }
 
 impl Shafts {
@@ -79,7 +88,9 @@ impl Shafts {
             before: Vec::new(),
             owner: Vec::new(),
             chains: vec![empty; count],
+            watched: false,
             laid: Vec::new(),
+            struck: Vec::new(),
         }
     }
 
@@ -137,50 +148,20 @@ impl Shafts {
         let chain = &mut self.chains[shaft];
         chain.tip = site;
         chain.tip_time = time as f32;
-        chain.end = OpenEnd { anchor: at, tip: at, ..OpenEnd::default() };
+        chain.end = OpenEnd::at(at);
     }
 
     /// Moves the tip of a shaft on to a site with reference position `at`; stores the former tip when the chord to the
     /// new one would leave the tolerance or grow too long.
     pub fn extend(&mut self, shaft: usize, site: Site, at: [f64; 2], time: f64) {
         let Chain { tip, tip_time, end, .. } = self.chains[shaft];
-        if let Some(wider) = self.widened(end, at) {
-            self.chains[shaft].end = wider;
-        } else {
+        self.chains[shaft].end = end.widened(at, self.tolerance, self.longest).unwrap_or_else(|| {
             self.push(shaft, tip, tip_time);
-            let fresh = OpenEnd { anchor: end.tip, tip: end.tip, ..OpenEnd::default() };
-            self.chains[shaft].end = self.widened(fresh, at).unwrap_or(OpenEnd { tip: at, ..fresh });
-        }
+            OpenEnd::chord(end.tip, at, self.tolerance, self.longest)
+        });
         let chain = &mut self.chains[shaft];
         chain.tip = site;
         chain.tip_time = time as f32;
-    }
-
-    /// The open end with its tip at `to`, or `None` when the chord from the anchor to `to` would pass a point of the path
-    /// at more than the tolerance. The sector of allowed directions is kept as tangents of angles from a first direction.
-    fn widened(&self, end: OpenEnd, to: [f64; 2]) -> Option<OpenEnd> {
-        let chord = [to[0] - end.anchor[0], to[1] - end.anchor[1]];
-        let length = chord[0].hypot(chord[1]);
-        if end.far == 0.0 {
-            if length == 0.0 {
-                return Some(OpenEnd { tip: to, ..end });
-            }
-            let axis = [chord[0] / length, chord[1] / length];
-            let slope = self.tolerance / length;
-            return Some(OpenEnd { tip: to, axis, low: -slope, high: slope, far: length, ..end });
-        }
-        let along = chord[0] * end.axis[0] + chord[1] * end.axis[1];
-        let across = chord[1] * end.axis[0] - chord[0] * end.axis[1];
-        if along <= 0.5 * length || length > self.longest || length < end.far {
-            return None;
-        }
-        let slope = across / along;
-        if slope < end.low || slope > end.high {
-            return None;
-        }
-        let room = self.tolerance / along;
-        let (low, high) = (end.low.max(slope - room), end.high.min(slope + room));
-        Some(OpenEnd { tip: to, low, high, far: end.far.max(length), ..end })
     }
 
     fn push(&mut self, shaft: usize, site: Site, time: f32) {
@@ -192,7 +173,9 @@ impl Shafts {
         self.times[place] = time;
         self.weights[place] = [site.weights[0], site.weights[1]];
         self.used[block as usize] += 1;
-        self.laid.push(place as VertexId);
+        if self.watched {
+            self.laid.push(place as VertexId);
+        }
     }
 
     fn add_block(&mut self, shaft: usize) -> u32 {
@@ -214,9 +197,72 @@ impl Shafts {
         block
     }
 
+    /// Keeps note of what is laid and struck out from now on, for a neighbour index.
+    pub fn watch(&mut self) {
+        self.watched = true;
+    }
+
     /// Vertices stored since the last call, in the order they were laid: what a neighbour index has to add.
     pub fn take_laid(&mut self) -> Vec<VertexId> {
         std::mem::take(&mut self.laid)
+    }
+
+    /// Vertices struck out since the last call that had been taken as laid before: what a neighbour index has to forget, before it
+    /// adds what was laid.
+    pub fn take_struck(&mut self) -> Vec<Struck> {
+        std::mem::take(&mut self.struck)
+    }
+
+    /// Strikes out what comes after the first `kept` stored vertices of a shaft (at least one), lays `points` after them, and puts
+    /// the tip at `tip`. Consecutive points lie at most [`Self::longest`] apart.
+    ///
+    /// Nothing happens to a shaft that has not begun.
+    pub fn lay_anew(&mut self, shaft: usize, kept: usize, points: &[ShaftPoint], tip: ShaftPoint) {
+        let stored = self.vertices(shaft).count();
+        if stored == 0 {
+            return;
+        }
+        for _ in kept.max(1)..stored {
+            self.strike_last(shaft);
+        }
+        for point in points {
+            self.push(shaft, point.site, point.time);
+        }
+        let chain = &mut self.chains[shaft];
+        (chain.tip, chain.tip_time) = (tip.site, tip.time);
+    }
+
+    /// Begins the open end of a shaft anew, from the reference position of its last stored vertex to that of its tip (µm).
+    pub fn reopen(&mut self, shaft: usize, last: [f64; 2], tip: [f64; 2]) {
+        self.chains[shaft].end = OpenEnd::chord(last, tip, self.tolerance, self.longest);
+    }
+
+    fn strike_last(&mut self, shaft: usize) {
+        let block = self.chains[shaft].last;
+        if block == NONE {
+            return;
+        }
+        let vertex = block * BLOCK as u32 + u32::from(self.used[block as usize]) - 1;
+        match self.laid.iter().rposition(|&laid| laid == vertex) {
+            Some(place) => drop(self.laid.remove(place)),
+            None if self.watched => self.struck.push(Struck { vertex, point: self.point(vertex) }),
+            None => {}
+        }
+        self.used[block as usize] -= 1;
+        if self.used[block as usize] == 0 {
+            let before = self.before[block as usize];
+            let chain = &mut self.chains[shaft];
+            chain.last = before;
+            match before {
+                NONE => chain.first = NONE,
+                before => self.next[before as usize] = NONE,
+            }
+        }
+    }
+
+    /// The block before a block along its shaft.
+    pub fn block_before(&self, block: u32) -> Option<u32> {
+        Some(self.before[block as usize]).filter(|&before| before != NONE)
     }
 
     /// The shaft that a stored vertex belongs to.
@@ -253,6 +299,11 @@ impl Shafts {
     #[inline]
     pub fn tip(&self, shaft: u32) -> MaterialPoint<2> {
         self.chains[shaft as usize].tip.planar()
+    }
+
+    /// Time (h) of the tip: when it came there, or after drawing back the time of the last vertex that is left.
+    pub fn tip_time(&self, shaft: u32) -> f32 {
+        self.chains[shaft as usize].tip_time
     }
 
     /// The stored vertices of a shaft, from the origin on.
@@ -353,6 +404,7 @@ mod tests {
     #[test]
     fn interleaved_shafts_keep_their_own_order_across_blocks() {
         let mut shafts = Shafts::new(3, 1e-9, 1e9);
+        shafts.watch();
         let at = |shaft: usize, i: usize| [i as f64, ((i * (shaft + 1)) as f64).sin()];
         for i in 0..100 {
             for shaft in 0..3 {
@@ -373,5 +425,30 @@ mod tests {
             assert!(shafts.vertices(shaft).eq(backwards));
         }
         assert_eq!(shafts.take_laid().len(), 3 * 99);
+    }
+
+    #[test]
+    fn what_is_struck_out_is_told_once_and_what_is_laid_after_it_follows_what_was_kept() {
+        let mut shafts = Shafts::new(1, 1e-9, 1e9);
+        shafts.watch();
+        let at = |i: usize| [i as f64, (i as f64).sin()];
+        shafts.start(0, site(at(0)), at(0), 0.0);
+        (1..=40).for_each(|i| shafts.extend(0, site(at(i)), at(i), i as f64));
+        assert_eq!(shafts.take_laid().len(), 40);
+        let point = |i: usize| ShaftPoint { site: site(at(i)), time: i as f32 };
+        shafts.lay_anew(0, 10, &[point(50), point(51)], point(52));
+        let struck = shafts.take_struck();
+        assert_eq!(struck.len(), 30);
+        assert!(struck.iter().enumerate().all(|(k, gone)| gone.point.weights == at(39 - k)));
+        assert_eq!(shafts.take_laid().len(), 2);
+        let line: Vec<_> = shafts.polyline(0).iter().map(|point| point.weights).collect();
+        let expected: Vec<_> = (0..10).chain(50..53).map(at).collect();
+        assert_eq!(line, expected);
+        // What nobody has heard of yet goes without a word; the first vertex stays.
+        shafts.extend(0, site(at(60)), at(60), 60.0);
+        shafts.lay_anew(0, 12, &[], point(5));
+        assert!(shafts.take_struck().is_empty() && shafts.take_laid().is_empty());
+        shafts.lay_anew(0, 0, &[], point(0));
+        assert_eq!((shafts.polyline(0).len(), shafts.vertex_count(), shafts.tip_time(0)), (2, 1, 0.0));
     }
 }

@@ -37,3 +37,4 @@ pub mod triangulate;
 pub mod turning;
 mod vector;
 pub mod walk;
+pub mod zipper;

@@ -23,13 +23,15 @@ pub(super) fn draw_markers(svg: &mut Svg, status: TipStatus, radius: f64, places
         TipStatus::Arrived => theme::ARRIVED,
         TipStatus::Stalled => theme::STALLED,
         TipStatus::Left => theme::LEFT,
+        TipStatus::Retracting => theme::RETRACTING,
+        TipStatus::Withdrawn => theme::STALLED,
     });
     let rim = if status == TipStatus::Left { theme::INK } else { "#ffffff" };
     svg.element("path", &[("d", &data), ("fill", "none"), ("stroke", rim), ("stroke-width", RIM)]);
     svg.element("path", &[("d", &data), ("fill", &fill)]);
 }
 
-/// Growing: a disc; arrived: a diamond; stalled: a square; left: a triangle.
+/// Growing: a disc; arrived: a diamond; stalled: a square; left: a triangle; retracting: one that points down; withdrawn: a bar.
 fn append_marker(data: &mut String, status: TipStatus, radius: f64, [x, y]: [f64; 2]) {
     let start = |dx: f64, dy: f64| format!("M{} {}", number(x + dx), number(y + dy));
     let r = radius;
@@ -53,6 +55,14 @@ fn append_marker(data: &mut String, status: TipStatus, radius: f64, [x, y]: [f64
         TipStatus::Left => {
             let q = 1.3 * r;
             write!(data, "{}{}z", start(0.0, -q), polygon(&[[q, 1.8 * q], [-2.0 * q, 0.0]]))
+        }
+        TipStatus::Retracting => {
+            let q = 1.3 * r;
+            write!(data, "{}{}z", start(0.0, q), polygon(&[[q, -1.8 * q], [-2.0 * q, 0.0]]))
+        }
+        TipStatus::Withdrawn => {
+            let q = 1.1 * r;
+            write!(data, "{}{}z", start(-q, -0.4 * q), polygon(&[[2.0 * q, 0.0], [0.0, 0.8 * q], [-2.0 * q, 0.0]]))
         }
     };
 }

@@ -1,6 +1,6 @@
 //! Morphology of a whole run: arrivals, path shape, turning, dispersion and fascicles.
 //!
-//! One [`AxonRecord`] an axon goes in, one [`Morphology`] comes out. A measure that has no axons to speak of is `None`
+//! One [`AxonRecord`] an axon or branch goes in, one [`Morphology`] comes out. A measure that has no axons to speak of is `None`
 //! (JSON `null`); no measure is ever NaN. Angles are radians inside and degrees in what is reported (the field's name
 //! says so), positive counter-clockwise.
 
@@ -8,7 +8,7 @@ use super::fascicles::{Height, HeightMeasures, measure_at_height};
 use super::statistics::Distribution;
 use serde::Serialize;
 
-/// What is known of one *born* axon at the moment of measuring.
+/// What is known of one *born* axon, or of a branch, at the moment of measuring.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AxonRecord {
     /// Index of its population.
@@ -17,8 +17,10 @@ pub struct AxonRecord {
     pub shaft: Vec<[f64; 2]>,
     /// When the axon was born, h.
     pub birth_time: f64,
-    /// When its growth cone reached the target, h; none if it has not.
+    /// When the first of its growth cones reached the target, h; none if none has.
     pub arrival_time: Option<f64>,
+    /// Whether it is a branch: its shaft counts, but arrivals, births and turning are those of axons.
+    pub is_branch: bool,
     /// Heading at birth (any length but zero).
     pub initial_heading: [f64; 2],
     /// Heading now (any length but zero).
@@ -78,7 +80,8 @@ pub struct Morphology {
 
 /// Measures the axons born so far.
 pub fn measure(axons: &[AxonRecord], options: &MeasureOptions) -> Morphology {
-    let (early, late) = split_birth_window(axons);
+    let trunks: Vec<AxonRecord> = axons.iter().filter(|axon| !axon.is_branch).cloned().collect();
+    let (early, late) = split_birth_window(&trunks);
     let shafts: Vec<Vec<[f64; 2]>> = axons.iter().map(|axon| axon.shaft.clone()).collect();
     let populations: Vec<u16> = axons.iter().map(|axon| axon.population).collect();
     let height = |&share: &f64| {
@@ -86,16 +89,16 @@ pub fn measure(axons: &[AxonRecord], options: &MeasureOptions) -> Morphology {
         measure_at_height(&shafts, &populations, height, options.linkage)
     };
     Morphology {
-        hits: count_hits(axons.iter()),
+        hits: count_hits(trunks.iter()),
         hits_early: count_hits(early.into_iter()),
         hits_late: count_hits(late.into_iter()),
-        travel_time_h: distribution(axons, |axon| Some(axon.arrival_time? - axon.birth_time)),
+        travel_time_h: distribution(&trunks, |axon| Some(axon.arrival_time? - axon.birth_time)),
         length_um: distribution(axons, |axon| Some(path_length(&axon.shaft))),
         straightness: distribution(axons, |axon| straightness(&axon.shaft)),
-        turning_angle_deg: distribution(axons, |axon| {
+        turning_angle_deg: distribution(&trunks, |axon| {
             turning_angle(axon.initial_heading, &axon.shaft).map(f64::to_degrees)
         }),
-        heading_turn_deg: distribution(axons, |axon| {
+        heading_turn_deg: distribution(&trunks, |axon| {
             signed_angle(axon.initial_heading, axon.final_heading).map(f64::to_degrees)
         }),
         heights: options.shares.iter().map(height).collect(),
@@ -172,6 +175,7 @@ mod tests {
             shaft: vec![[0.0, 0.0], end],
             birth_time,
             arrival_time,
+            is_branch: false,
             initial_heading: [0.0, 1.0],
             final_heading: end,
         }

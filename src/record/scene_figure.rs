@@ -28,11 +28,16 @@ pub enum TipStatus {
     Stalled,
     /// Gone across a border.
     Left,
+    /// Drawing back.
+    Retracting,
+    /// Drawn back for good.
+    Withdrawn,
 }
 
 impl TipStatus {
     /// All of them, in the order of legends.
-    pub const ALL: [Self; 4] = [Self::Growing, Self::Arrived, Self::Stalled, Self::Left];
+    pub const ALL: [Self; 6] =
+        [Self::Growing, Self::Arrived, Self::Stalled, Self::Left, Self::Retracting, Self::Withdrawn];
 
     /// The word for it.
     pub fn word(self) -> &'static str {
@@ -41,6 +46,8 @@ impl TipStatus {
             Self::Arrived => "arrived",
             Self::Stalled => "stalled",
             Self::Left => "left",
+            Self::Retracting => "retracting",
+            Self::Withdrawn => "withdrawn",
         }
     }
 }

@@ -48,10 +48,13 @@ fn cue(field: &FieldView) -> Option<CueLayer> {
 fn tip(tip: &TipView) -> Option<Tip> {
     let status = match tip.status {
         Status::Unborn => return None,
+        Status::Withdrawn if tip.is_branch => return None,
         Status::Growing => TipStatus::Growing,
         Status::Arrived => TipStatus::Arrived,
         Status::Stalled => TipStatus::Stalled,
         Status::Left => TipStatus::Left,
+        Status::Retracting => TipStatus::Retracting,
+        Status::Withdrawn => TipStatus::Withdrawn,
     };
     Some(Tip { position: tip.position, status })
 }

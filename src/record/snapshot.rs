@@ -3,6 +3,7 @@
 use crate::model::clock::Clock;
 use crate::model::components::{GrowthCone, Journey, Site, SpringState, Status};
 use crate::model::observables::{Effect, Observables};
+use crate::model::remodel::SpareCones;
 use crate::model::shafts::Shafts;
 use crate::model::tissue::{Configuration, Tissue};
 use crate::record::measures::AxonRecord;
@@ -31,6 +32,8 @@ pub struct TipView {
     pub heading: [f64; 2],
     /// What it is doing.
     pub status: Status,
+    /// Whether it is the tip of a branch.
+    pub is_branch: bool,
 }
 
 /// The scene at one instant.
@@ -87,6 +90,7 @@ pub fn shafts(world: &World) -> Vec<Vec<[f64; 2]>> {
 /// Tips of all axons born, in the order of the cones.
 pub fn tips(world: &World) -> Vec<TipView> {
     let (tissue, configuration) = (world.resource::<Tissue>(), world.resource::<Configuration>());
+    let spares = world.get_resource::<SpareCones>();
     let Some(mut cones) = world.try_query_filtered::<(&GrowthCone, &Status, &Site, &SpringState), With<GrowthCone>>()
     else {
         return Vec::new();
@@ -97,7 +101,8 @@ pub fn tips(world: &World) -> Vec<TipView> {
         .map(|(cone, status, site, spring)| {
             let x = configuration.position(&tissue.mesh, *site);
             let heading = [spring.heading.x, spring.heading.y];
-            TipView { axon: cone.axon, position: [x.x, x.y], heading, status: *status }
+            let is_branch = spares.is_some_and(|spares| spares.is_branch(cone.axon));
+            TipView { axon: cone.axon, position: [x.x, x.y], heading, status: *status, is_branch }
         })
         .collect()
 }
@@ -109,13 +114,20 @@ pub fn axon_records(world: &World) -> Vec<AxonRecord> {
     else {
         return Vec::new();
     };
+    let spares = world.get_resource::<SpareCones>();
+    let mut arrivals = BTreeMap::new();
+    for (cone, _, journey, _) in cones.iter(world).filter(|(_, status, ..)| **status == Status::Arrived) {
+        let first = arrivals.entry(spares.map_or(cone.axon, |spares| spares.root(cone.axon))).or_insert(journey.ended);
+        *first = journey.ended.min(*first);
+    }
     let born = cones.iter(world).filter(|(_, status, ..)| **status != Status::Unborn);
     born.zip(shafts(world))
-        .map(|((cone, status, journey, spring), shaft)| AxonRecord {
+        .map(|((cone, _, journey, spring), shaft)| AxonRecord {
             population: cone.population,
             shaft,
             birth_time: cone.birth_time,
-            arrival_time: (*status == Status::Arrived).then_some(journey.ended),
+            arrival_time: arrivals.get(&cone.axon).copied(),
+            is_branch: spares.is_some_and(|spares| spares.is_branch(cone.axon)),
             initial_heading: [journey.first_heading[0], journey.first_heading[1]],
             final_heading: [spring.heading.x, spring.heading.y],
         })

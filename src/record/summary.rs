@@ -30,6 +30,12 @@ pub struct Counts {
     pub stalled: usize,
     /// Gone across the border.
     pub left: usize,
+    /// Drawing back.
+    pub retracting: usize,
+    /// Drawn back for good.
+    pub withdrawn: usize,
+    /// Branches that sprouted, whatever their tips are doing; the other counts are of axons.
+    pub branches: usize,
 }
 
 /// Quantities that follow from the keys of `growth`, for one population.
@@ -140,18 +146,25 @@ fn morphology(world: &World, options: &MeasureOptions) -> Morphology {
 }
 
 fn counts(world: &World) -> Counts {
-    let axons = world.resource::<Shafts>().count();
+    let axons = world.resource::<Populations>().0.iter().map(|population| population.count).sum();
     let mut counts = Counts { axons, ..Counts::default() };
     for tip in tips(world) {
+        if tip.is_branch {
+            counts.branches += 1;
+            continue;
+        }
         match tip.status {
             Status::Unborn => {}
             Status::Growing => counts.growing += 1,
             Status::Arrived => counts.arrived += 1,
             Status::Stalled => counts.stalled += 1,
             Status::Left => counts.left += 1,
+            Status::Retracting => counts.retracting += 1,
+            Status::Withdrawn => counts.withdrawn += 1,
         }
     }
-    counts.unborn = axons - counts.growing - counts.arrived - counts.stalled - counts.left;
+    let Counts { growing, arrived, stalled, left, retracting, withdrawn, .. } = counts;
+    counts.unborn = axons - growing - arrived - stalled - left - retracting - withdrawn;
     counts
 }
 

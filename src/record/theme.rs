@@ -44,6 +44,8 @@ pub const ARRIVED: [u8; 3] = [0x00, 0x9e, 0x73];
 pub const STALLED: [u8; 3] = [0x2b, 0x2b, 0x2b];
 /// Colour of tips that left the tissue.
 pub const LEFT: [u8; 3] = [0xf0, 0xd0, 0x30];
+/// Colour of retracting tips (Okabe & Ito's blue).
+pub const RETRACTING: [u8; 3] = [0x00, 0x72, 0xb2];
 
 /// The font families, best first; the first is embedded.
 pub const FONT_FAMILY: &str = "DejaVu Sans, Verdana, sans-serif";

@@ -11,6 +11,7 @@ use crate::model::integrator::{advance, bring_tissue_to};
 use crate::model::mechanism::{InstallError, Installable, ModelBuilder, Roster};
 use crate::model::observables::Observables;
 use crate::model::plan::{Each, Plan};
+use crate::model::remodel::Unrest;
 use crate::model::schedule::{MotionSchedule, Phase, RightHandSide, Schedules, Term};
 use crate::model::settle::settle;
 use crate::model::shafts::Shafts;
@@ -68,7 +69,9 @@ pub(super) fn assemble(loaded: &Loaded, roster: &Roster, shelf: &Shelf) -> Resul
     }
     insert_tissue(&mut world, loaded, &chosen)?;
     world.resource_mut::<Stopwatch>().lap("mesh");
-    let cones = populate::spawn_cones(&mut world, scene)?;
+    world.init_resource::<Unrest>();
+    let spares = chosen.iter().map(|chosen| chosen.law.spare_cones()).sum();
+    let cones = populate::spawn_cones(&mut world, scene, spares)?;
     let mut schedules = Schedules::new();
     install(&mut world, &mut schedules, chosen, scene.seed, &cones)?;
     stop_at_first_kink(&mut world);

@@ -14,6 +14,7 @@ use crate::model::components::{GrowthCone, Status};
 use crate::model::health::{Counters, Fault, Health};
 use crate::model::integrator::bring_tissue_to;
 use crate::model::mechanism::Roster;
+use crate::model::remodel::Unrest;
 use crate::model::shelf::Shelf;
 use crate::model::stopwatch::Stopwatch;
 use crate::model::tissue::Configuration;
@@ -88,6 +89,7 @@ impl Simulation {
             return Ok(());
         }
         self.bring_tissue_here();
+        self.world.resource_mut::<Unrest>().0 = false;
         self.step.run(&mut self.world);
         let reached = self.world.resource::<Clock>().now;
         while self.births.get(self.next_birth).is_some_and(|birth| *birth < reached) {
@@ -115,6 +117,7 @@ impl Simulation {
     fn is_idle(&mut self, to: u64) -> bool {
         let none_due = self.births.get(self.next_birth).is_none_or(|birth| *birth >= to);
         let mut cones = self.world.query_filtered::<&Status, With<GrowthCone>>();
-        none_due && !cones.iter(&self.world).any(|status| *status == Status::Growing)
+        let calm = !self.world.resource::<Unrest>().0;
+        none_due && calm && !cones.iter(&self.world).any(|status| *status == Status::Growing)
     }
 }

@@ -12,6 +12,7 @@ use crate::model::components::{
 use crate::model::growth::{Population, Populations, ShaftPopulations};
 use crate::model::integrator::BYTES_A_STEP;
 use crate::model::random::{KeyedRng, Stream};
+use crate::model::remodel::SpareCones;
 use crate::model::shafts::Shafts;
 use crate::model::tissue::Tissue;
 use crate::model::violation::Violation;
@@ -26,6 +27,8 @@ use rand::RngExt;
 const BIRTHS: Stream = Stream::named("births");
 /// Draw of the birth time.
 const WHEN: u64 = 0;
+/// Birth of a cone that waits for a branch.
+const NEVER: u64 = u64::MAX;
 /// Draw of the birth place.
 const WHERE: u64 = 1;
 
@@ -40,8 +43,8 @@ type ConeState = (GrowthCone, Origin, Status, Site, Position, Velocity, SpringSt
 /// Bytes of an axon and its growth cone: their components, and what is kept of the cone during a step.
 pub(super) const BYTES_AN_AXON: usize = size_of::<Axon>() + size_of::<ConeState>() + BYTES_A_STEP;
 
-/// Spawns axons and growth cones; returns the cones in order.
-pub(super) fn spawn_cones(world: &mut World, scene: &Scene) -> Result<Vec<Entity>, AssemblyError> {
+/// Spawns axons and growth cones, with `spares` more cones for each axon after those of all axons; returns the cones in order.
+pub(super) fn spawn_cones(world: &mut World, scene: &Scene, spares: u32) -> Result<Vec<Entity>, AssemblyError> {
     let mut cones = Vec::new();
     let mut list = Vec::new();
     let mut of_shaft = Vec::new();
@@ -58,17 +61,37 @@ pub(super) fn spawn_cones(world: &mut World, scene: &Scene) -> Result<Vec<Entity
         }
     }
     world.insert_resource(Populations(list));
-    world.insert_resource(ShaftPopulations(of_shaft));
-    world.insert_resource(Shafts::new(cones.len(), SHAFT_TOLERANCE, LONGEST_SEGMENT));
     let births: Vec<u64> = cones.iter().filter_map(|&cone| world.get::<GrowthCone>(cone)).map(|c| c.birth).collect();
     world.insert_resource(BirthQueue::new(births.into_iter()));
+    if spares > 0 {
+        spawn_spares(world, &mut cones, &mut of_shaft, spares);
+    }
+    world.insert_resource(ShaftPopulations(of_shaft));
+    world.insert_resource(Shafts::new(cones.len(), SHAFT_TOLERANCE, LONGEST_SEGMENT));
     Ok(cones)
+}
+
+/// Spawns the cones of branches yet to come: like that of their axon, but born at no time.
+fn spawn_spares(world: &mut World, cones: &mut Vec<Entity>, of_shaft: &mut Vec<u16>, each: u32) {
+    let axons = cones.len();
+    for axon in 0..axons {
+        let Some((&own, &origin)) = world.get::<GrowthCone>(cones[axon]).zip(world.get::<Origin>(cones[axon])) else {
+            continue;
+        };
+        for _ in 0..each {
+            let number = cones.len() as u32;
+            let identity = GrowthCone { axon: number, birth: NEVER, birth_time: 0.0, ..own };
+            cones.push(spawn_cone(world, identity, origin));
+            of_shaft.push(own.population);
+        }
+    }
+    world.insert_resource(SpareCones::new(axons as u32, each));
 }
 
 /// The instants of all births (ticks), ascending.
 pub(super) fn births_in_order(world: &mut World) -> Vec<u64> {
     let mut cones = world.query_filtered::<&GrowthCone, With<GrowthCone>>();
-    let mut births: Vec<u64> = cones.iter(world).map(|cone| cone.birth).collect();
+    let mut births: Vec<u64> = cones.iter(world).map(|cone| cone.birth).filter(|birth| *birth != NEVER).collect();
     births.sort_unstable();
     births
 }
@@ -77,6 +100,10 @@ fn spawn(world: &mut World, axon: Axon, origin: Origin, speed: f64) -> Entity {
     world.spawn(axon);
     let birth_time = world.resource::<Clock>().grid.hours(axon.birth);
     let identity = GrowthCone { axon: axon.number, population: axon.population, speed, birth: axon.birth, birth_time };
+    spawn_cone(world, identity, origin)
+}
+
+fn spawn_cone(world: &mut World, identity: GrowthCone, origin: Origin) -> Entity {
     let state: ConeState = (
         identity,
         origin,

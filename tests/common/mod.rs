@@ -7,6 +7,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use bevy_ecs::prelude::{With, World};
 use serde_json::Value;
 use tropism::model::clock::Clock;
+use tropism::model::shafts::Shafts;
 use tropism::prelude::{GrowthCone, Journey, Position, Roster, SpringState, Status, Vector3};
 use tropism::record::recorder::{Recorder, RecorderOptions};
 use tropism::scenario::load::{Loaded, Request, ScenarioErrors};
@@ -118,7 +119,7 @@ pub fn cones(world: &World) -> Vec<ConeState> {
         .collect()
 }
 
-/// FNV-1a of the bits of every number of every cone's state.
+/// FNV-1a of the bits of every number of every cone's state, and of every point of every shaft.
 pub fn hash_of_states(world: &World) -> u64 {
     let mut hash = Fnv::default();
     for cone in cones(world) {
@@ -137,6 +138,11 @@ pub fn hash_of_states(world: &World) -> u64 {
         ] {
             hash.bytes(&number.to_bits().to_le_bytes());
         }
+    }
+    let shafts = world.resource::<Shafts>();
+    for point in (0..shafts.count()).flat_map(|shaft| shafts.polyline(shaft)) {
+        hash.bytes(&point.cell.to_le_bytes());
+        point.weights.iter().for_each(|x| hash.bytes(&x.to_bits().to_le_bytes()));
     }
     hash.0
 }

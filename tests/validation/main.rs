@@ -8,5 +8,6 @@ mod cue_elements;
 mod fixed_pull;
 mod mechanisms;
 mod noise;
+mod remodelling;
 mod tissue;
 mod turning;

@@ -7,10 +7,10 @@ use serde_json::{Map, Value, json};
 use tropism::scenario::load::Request;
 use tropism::study::run::read;
 
-const SPEED: f64 = 20.0;
+pub(crate) const SPEED: f64 = 20.0;
 
 /// Cones of one axon each, from a place with a heading (degrees) and a time of birth (h), in a wide tissue.
-fn scene(axons: &[([f64; 2], f64, f64)], duration: f64, step: f64, blocks: Value) -> Value {
+pub(crate) fn scene(axons: &[([f64; 2], f64, f64)], duration: f64, step: f64, blocks: Value) -> Value {
     let population = |(i, (from, heading, birth)): (usize, &([f64; 2], f64, f64))| {
         let origin = json!({ "points": [from] });
         let keys =
@@ -127,6 +127,8 @@ fn a_mechanism_without_strength_changes_no_bit() {
         json!({ "durotaxis": { "weight": 0, "speed_exponent": 0, "profile": [[0, 100], [800, 2000]] } }),
         json!({ "steric_repulsion": { "weight": 0 } }),
         json!({ "leader_follower": { "regions": { "goal": disc }, "leader_speed": 1 } }),
+        json!({ "retraction": { "prune_after": 100 } }),
+        json!({ "zippering": { "adhesion": 0 } }),
     ] {
         assert_eq!(base(block.clone()), without, "{block}");
     }
@@ -151,7 +153,7 @@ fn a_bound_cue_is_the_diffusing_one_at_rest_and_another_one_in_a_stretched_tissu
 }
 
 /// A measure of a scenario of the repository over its first seeds, with some keys set and mechanisms left out.
-fn measured(name: &str, without: &[&str], set: &[&str], pick: impl Fn(&Value) -> f64) -> f64 {
+pub(crate) fn measured(name: &str, without: &[&str], set: &[&str], pick: impl Fn(&Value) -> f64) -> f64 {
     let seeds = 2;
     let of_seed = |seed: u64| {
         let path = format!("{}/scenarios/{name}.json", env!("CARGO_MANIFEST_DIR")).into();
@@ -165,7 +167,7 @@ fn measured(name: &str, without: &[&str], set: &[&str], pick: impl Fn(&Value) ->
     (1..=seeds).map(of_seed).sum::<f64>() / seeds as f64
 }
 
-fn at<'a>(pointer: &'a str) -> impl Fn(&Value) -> f64 + 'a {
+pub(crate) fn at<'a>(pointer: &'a str) -> impl Fn(&Value) -> f64 + 'a {
     move |summary| summary.pointer(pointer).and_then(Value::as_f64).unwrap_or_else(|| panic!("no {pointer}"))
 }
 
@@ -216,6 +218,11 @@ fn what_makes_no_sense_is_refused_with_its_place() {
         (json!({ "durotaxis": { "profile": [[1, 5], [0, 5]] } }), "/durotaxis/profile: places must ascend"),
         (json!({ "durotaxis": { "profile": [[1, -5]] } }), "/durotaxis/profile: a stiffness is positive"),
         (json!({ "leader_follower": {} }), "/leader_follower/regions: give a region"),
+        (json!({ "retraction": {} }), "/retraction: give `prune_after`"),
+        (json!({ "retraction": { "collapse": { "cue": "slit" } } }), "/retraction/collapse/cue: there is no cue"),
+        (json!({ "branching": { "cue": "slit" } }), "/branching/cue: there is no cue"),
+        (json!({ "branching": { "most": 65 } }), "/branching/most"),
+        (json!({ "zippering": { "adhesion": 2000 } }), "/zippering/adhesion: no angle balances"),
     ] {
         let scene = scene(&[([500.0, 500.0], 0.0, 0.0)], 1.0, 0.1, block);
         let refused = try_load(&scene, &roster(), &[], &[]).map(|_| ()).unwrap_err().to_string();

@@ -1,0 +1,320 @@
+//! Zippering: shafts that cross adhere, and the point where they part moves until adhesion and tension balance.
+//!
+//! Two shafts under tension T that adhere with a force S part at a zipper point at an angle β. What pulls the point, and its speed, are
+//! (Šmít et al., eLife 6:e19907, 2017, doi:10.7554/eLife.19907)
+//!
+//! ```text
+//! F = S − 2T(1 − cos β/2),   dy/dt = F / (2 η_e (cos β/2 − 1)²/L + η_Z),
+//! ```
+//!
+//! which stops at cos β*/2 = 1 − S/(2T). Written for arms that are not alike, F = T(u₁ + u₂) + (2T − S) u_z with the unit vectors along both
+//! arms and the zipped part; that is the formula above, along the bisector, where they are alike. Mouse olfactory axons: T = 679 pN, S = 102 pN
+//! (52 to 186), β of 51° on average, 0.3 to 2 µm/min.
+//!
+//! Shafts zip once both have stopped growing. A crossing opens into two points that move apart, on the sides where the shafts meet at less
+//! than 90°. Ours: an arm is pulled straight over `arm` of its length; a pair zips at its first crossing only; a crossing within `arm` of the
+//! end of a shaft, of a fork or of another zipper point is left alone, and zipper points stop there; drag of the zipped part is neglected.
+
+use crate::numerics::zipper::{Arms, Balance, crossing};
+use crate::prelude::*;
+use std::collections::{BTreeMap, BTreeSet};
+
+keys! {
+    /// Shafts that adhere where they cross; dy/dt = (S − 2T(1 − cos β/2))/(2η_e(cos β/2 − 1)²/L + η_Z).
+    pub struct Zippering {
+        /// Tension T of a shaft.
+        #[schemars(extend("exclusiveMinimum" = 0.0, "x-typical" = [200.0, 2000.0]))]
+        pub tension: Force = Force(679.0),
+        /// Force S with which two shafts adhere.
+        #[schemars(extend("minimum" = 0.0, "x-typical" = [0.0, 200.0]))]
+        pub adhesion: Force = Force(102.0),
+        /// Drag η_Z of a zipper point. Ours: 1.4 µm/min where β is small.
+        #[schemars(extend("exclusiveMinimum" = 0.0, "x-typical" = [0.5, 5.0]))]
+        pub drag: Drag = Drag(1.2),
+        /// Elongational viscosity η_e of a shaft. Ours.
+        #[schemars(extend("minimum" = 0.0, "x-typical" = [0.0, 1000.0]))]
+        pub elongational_viscosity: ElongationalViscosity = ElongationalViscosity(100.0),
+        /// Length L of an arm that is pulled straight. Ours.
+        #[schemars(extend("exclusiveMinimum" = 0.0, "x-typical" = [10.0, 100.0]))]
+        pub arm: Length = Length(30.0),
+    }
+}
+
+impl From<&Zippering> for Balance {
+    fn from(law: &Zippering) -> Self {
+        Self {
+            tension: law.tension.0,
+            adhesion: law.adhesion.0,
+            drag: law.drag.0,
+            elongational_viscosity: law.elongational_viscosity.0,
+        }
+    }
+}
+
+/// A point of a shaft that takes part.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Node {
+    point: ShaftPoint,
+    /// The zipper point that it is, by number of the bond and its end; ends and forks of shafts are held too.
+    held: Option<Held>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Held {
+    End,
+    Zipper { bond: usize, forward: bool },
+}
+
+/// Two shafts that zip; `same` if they run the same way. Its ends are the zipper points before and after on the first shaft.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Bond {
+    shafts: [u32; 2],
+    same: bool,
+}
+
+/// The zippers of a run.
+#[derive(Debug, Clone, Default, Resource)]
+pub struct Zippers {
+    last: f64,
+    resting: BTreeSet<u32>,
+    lines: BTreeMap<u32, Vec<Node>>,
+    bonds: Vec<Bond>,
+    /// Shafts that have to be laid anew.
+    changed: BTreeSet<u32>,
+}
+
+/// Farthest that a zipper point moves at once (µm).
+const STRIDE: f64 = 0.25;
+/// Longest time that its speed is taken as constant (h).
+const INSTANT: f64 = 0.02;
+/// Slower than this (µm/h), a point is at rest.
+const REST: f64 = 0.05;
+
+impl Mechanism for Zippering {
+    const NAME: &'static str = "zippering";
+
+    fn check(&self, _facts: &Facts) -> Violations {
+        let mut wrong = Violations::new();
+        wrong.demand(self.adhesion.0 <= 2.0 * self.tension.0, "/adhesion", || {
+            format!("no angle balances an adhesion above twice the tension, {} pN", 2.0 * self.tension.0)
+        });
+        wrong
+    }
+
+    fn install(self, model: &mut ModelBuilder) -> Result<(), InstallError> {
+        model.insert(Zippers::default()).insert_law(self).phase(Phase::Remodel, zip);
+        Ok(())
+    }
+}
+
+fn zip(law: Res<Law<Zippering>>, mut zippers: ResMut<Zippers>, mut remodelling: Remodelling) {
+    let now = remodelling.clock.hours();
+    let span = now - std::mem::replace(&mut zippers.last, now);
+    if law.adhesion.0 == 0.0 {
+        return;
+    }
+    zippers.welcome(&law, &remodelling);
+    let fastest = zippers.advance(&law, &remodelling, span);
+    zippers.lay(&mut remodelling);
+    remodelling.unrest.0 |= fastest > 0.0;
+}
+
+impl Zippers {
+    /// Shafts that zip, in pairs, with the angle β (rad) at both ends now.
+    pub fn angles(&self, place: impl Fn(Site) -> Vector3<f64>) -> Vec<[f64; 2]> {
+        let angle = |bond: usize, forward: bool| self.arms((bond, forward), &place).map_or(0.0, |arms| arms.angle());
+        (0..self.bonds.len()).map(|bond| [angle(bond, false), angle(bond, true)]).collect()
+    }
+
+    /// Looks for crossings of shafts that have come to rest with all that rest.
+    fn welcome(&mut self, law: &Zippering, remodelling: &Remodelling) {
+        let standing = remodelling.standing();
+        let rests = |status| matches!(status, Status::Arrived | Status::Stalled | Status::Left);
+        for cone in standing.iter().filter(|cone| rests(cone.status)) {
+            let number = cone.identity.axon;
+            if self.resting.contains(&number) {
+                continue;
+            }
+            let line = nodes(remodelling, number);
+            let places: Vec<Vector3<f64>> = line.iter().map(|node| remodelling.position(node.point.site)).collect();
+            self.lines.insert(number, line);
+            let reach = bounds(&places);
+            for &other in &self.resting.clone() {
+                let others: Vec<_> =
+                    self.lines[&other].iter().map(|node| remodelling.position(node.point.site)).collect();
+                if overlap(&reach, &bounds(&others)) {
+                    self.bind(law, remodelling, [number, other]);
+                }
+            }
+            self.resting.insert(number);
+        }
+    }
+
+    /// Binds two shafts at their first crossing, if it is far from whatever holds them.
+    fn bind(&mut self, law: &Zippering, remodelling: &Remodelling, shafts: [u32; 2]) {
+        let places = shafts.map(|shaft| {
+            let line = &self.lines[&shaft];
+            line.iter().map(|node| remodelling.position(node.point.site)).collect::<Vec<_>>()
+        });
+        let Some(found) = crossing(&places[0], &places[1]) else { return };
+        let clear = |k: usize| is_clear(&self.lines[&shafts[k]], &places[k], found[k], law.arm.0);
+        if !(clear(0) && clear(1)) {
+            return;
+        }
+        let along = |k: usize| places[k][found[k].0 + 1] - places[k][found[k].0];
+        let same = along(0).dot(&along(1)) >= 0.0;
+        let bond = self.bonds.len();
+        self.bonds.push(Bond { shafts, same });
+        let (segment, share) = found[0];
+        let site = remodelling.walked(self.lines[&shafts[0]][segment].point.site, along(0) * share);
+        for k in 0..2 {
+            let (segment, _) = found[k];
+            let Some(line) = self.lines.get_mut(&shafts[k]) else { return };
+            let point = ShaftPoint { site, time: line[segment].point.time };
+            let held = |late: bool| Some(Held::Zipper { bond, forward: late == (k == 0 || same) });
+            line.splice(segment + 1..segment + 1, [false, true].map(|late| Node { point, held: held(late) }));
+            self.changed.insert(shafts[k]);
+        }
+    }
+
+    /// Moves all zipper points over a time (h); returns the speed of the fastest at the end (µm/h).
+    fn advance(&mut self, law: &Zippering, remodelling: &Remodelling, span: f64) -> f64 {
+        let balance = Balance::from(law);
+        let mut fastest = 0.0f64;
+        for bond in 0..self.bonds.len() {
+            let mut left = span;
+            while left > 0.0 {
+                let mut taken = left.min(INSTANT);
+                let velocities = [false, true].map(|forward| {
+                    self.straighten((bond, forward), law.arm.0, remodelling);
+                    let arms = self.arms((bond, forward), |site| remodelling.position(site));
+                    let velocity = arms.map_or(Vector3::zeros(), |arms| balance.velocity(&arms));
+                    if velocity.norm() > REST { velocity } else { Vector3::zeros() }
+                });
+                let speed = velocities.iter().map(|velocity| velocity.norm()).fold(0.0, f64::max);
+                taken = if speed * taken > STRIDE { STRIDE / speed } else { taken };
+                for (forward, velocity) in [false, true].into_iter().zip(velocities) {
+                    self.shift((bond, forward), velocity * taken, remodelling);
+                }
+                left -= taken;
+                if left <= 0.0 {
+                    fastest = fastest.max(speed);
+                }
+            }
+        }
+        fastest
+    }
+
+    /// Place of a zipper point in the line of one of its shafts, and the direction in which its arm goes on there.
+    fn place(&self, (bond, forward): (usize, bool), k: usize) -> Option<(u32, usize, isize)> {
+        let Bond { shafts, same } = *self.bonds.get(bond)?;
+        let held = Some(Held::Zipper { bond, forward });
+        let at = self.lines.get(&shafts[k])?.iter().position(|node| node.held == held)?;
+        Some((shafts[k], at, if forward == (k == 0 || same) { 1 } else { -1 }))
+    }
+
+    /// Strikes out what keeps an arm shorter than `arm` (µm), unless it is held.
+    fn straighten(&mut self, end: (usize, bool), arm: f64, remodelling: &Remodelling) {
+        for k in 0..2 {
+            while let Some((shaft, at, step)) = self.place(end, k) {
+                let next = at.wrapping_add_signed(step);
+                let Some(line) = self.lines.get_mut(&shaft) else { return };
+                let far = |node: &Node| {
+                    node.held.is_some()
+                        || (remodelling.position(node.point.site) - remodelling.position(line[at].point.site)).norm()
+                            >= arm
+                };
+                if line.get(next).is_none_or(far) {
+                    break;
+                }
+                line.remove(next);
+            }
+        }
+    }
+
+    /// The arms of a zipper point, and its zipped part; none where an arm has no length left.
+    fn arms(&self, end: (usize, bool), place: impl Fn(Site) -> Vector3<f64>) -> Option<Arms> {
+        let site = |(shaft, at): (u32, usize)| Some(place(self.lines.get(&shaft)?.get(at)?.point.site));
+        let (shaft, at, _) = self.place(end, 0)?;
+        let point = site((shaft, at))?;
+        let arm = |k: usize| {
+            let (shaft, at, step) = self.place(end, k)?;
+            Some(site((shaft, at.wrapping_add_signed(step)))? - point)
+        };
+        let (shaft, other, _) = self.place((end.0, !end.1), 0)?;
+        Arms::new([arm(0)?, arm(1)?], site((shaft, other))? - point)
+    }
+
+    /// Moves a zipper point on both shafts.
+    fn shift(&mut self, end: (usize, bool), by: Vector3<f64>, remodelling: &Remodelling) {
+        let Some((shaft, at, _)) = self.place(end, 0).filter(|_| by != Vector3::zeros()) else { return };
+        let site = remodelling.walked(self.lines[&shaft][at].point.site, by);
+        for k in 0..2 {
+            let Some((shaft, at, _)) = self.place(end, k) else { return };
+            if let Some(node) = self.lines.get_mut(&shaft).and_then(|line| line.get_mut(at)) {
+                node.point.site = site;
+            }
+            self.changed.insert(shaft);
+        }
+    }
+
+    /// Lays the shafts anew whose zipper points have moved.
+    fn lay(&mut self, remodelling: &mut Remodelling) {
+        for shaft in std::mem::take(&mut self.changed) {
+            let Some((tip, path)) = self.lines.get(&shaft).and_then(|line| line.split_last()) else { continue };
+            let mut points = Vec::with_capacity(path.len());
+            for (node, next) in path.iter().zip(path.iter().skip(1).chain([tip])) {
+                points.push(node.point);
+                points.extend(remodelling.between(node.point, next.point));
+            }
+            remodelling.relay(shaft, 1, points.get(1..).unwrap_or_default(), tip.point);
+        }
+    }
+}
+
+/// The points of a shaft, its tip last; its ends and forks are held.
+fn nodes(remodelling: &Remodelling, shaft: u32) -> Vec<Node> {
+    let shafts = &remodelling.shafts;
+    let stored = shafts.vertices(shaft as usize);
+    let tip = ShaftPoint { site: shafts.tip(shaft).into(), time: shafts.tip_time(shaft) };
+    let point = |vertex| ShaftPoint { site: shafts.point(vertex).into(), time: shafts.time(vertex) };
+    let forks = remodelling.fork_times(shaft);
+    let mut line: Vec<Node> = stored
+        .map(point)
+        .chain([tip])
+        .map(|point| Node { point, held: forks.contains(&point.time).then_some(Held::End) })
+        .collect();
+    for end in [0, line.len() - 1] {
+        line[end].held = Some(Held::End);
+    }
+    line
+}
+
+/// Whether a crossing at a share of a segment is at least `arm` (µm) of path away from every held node, on a line at these places.
+fn is_clear(line: &[Node], places: &[Vector3<f64>], (segment, share): (usize, f64), arm: f64) -> bool {
+    let at = places[segment].lerp(&places[segment + 1], share);
+    let side = |order: &mut dyn Iterator<Item = usize>| {
+        let (mut from, mut path) = (at, 0.0);
+        for i in order {
+            path += (places[i] - from).norm();
+            if path >= arm {
+                return true;
+            }
+            if line[i].held.is_some() {
+                return false;
+            }
+            from = places[i];
+        }
+        false
+    };
+    side(&mut (0..=segment).rev()) && side(&mut (segment + 1..line.len()))
+}
+
+fn bounds(places: &[Vector3<f64>]) -> [Vector3<f64>; 2] {
+    let start = [Vector3::repeat(f64::INFINITY), Vector3::repeat(f64::NEG_INFINITY)];
+    places.iter().fold(start, |[low, high], place| [low.inf(place), high.sup(place)])
+}
+
+fn overlap(a: &[Vector3<f64>; 2], b: &[Vector3<f64>; 2]) -> bool {
+    (0..2).all(|k| a[0][k] <= b[1][k] && b[0][k] <= a[1][k])
+}

@@ -36,8 +36,12 @@ fn every_mechanism() -> Value {
     scene["bending_stiffness"] = json!({});
     scene["retraction"] = json!({ "prune_after": 3 });
     scene["branching"] = json!({ "rate": 0.3 });
-    let goal = [[150, 60], [300, 60], [300, 80], [150, 80]];
+    let goal = [[150, 40], [300, 40], [300, 80], [150, 80]];
     scene["targets"] = json!({ "goal": { "polygon": { "points": goal } } });
+    for (name, x, heading) in [("leftward", 234, 110), ("rightward", 226, 70)] {
+        scene["populations"][name] =
+            json!({ "count": 1, "origin": { "points": [[x, 5]] }, "heading": heading, "births": { "at": 0 } });
+    }
     scene["zippering"] = json!({ "arm": "2 um" });
     scene
 }

@@ -198,8 +198,10 @@ fn the_scenarios_of_remodelling_show_its_effect() {
     let (with, kept) = (length(&[]), length(&["retraction"]));
     println!("branching: {branches} branches, mean length {with:.0} um, {kept:.0} um if nothing is pruned");
     assert!(branches > 20.0 && with < 0.5 * kept);
+    let size =
+        |summary: &Value, k: usize| at(&format!("/morphology/heights/{k}/fascicles/mean_size_per_axon"))(summary);
     let fascicles = |without: &[&str]| {
-        measured("zippering", without, &[], at("/morphology/heights/1/fascicles/mean_size_per_axon"))
+        measured("zippering", without, &[], |summary| (0..3).map(|k| size(summary, k)).sum::<f64>() / 3.0)
     };
     let (zipped, apart) = (fascicles(&[]), fascicles(&["zippering"]));
     println!("zippering: {zipped:.2} axons in an axon's fascicle, {apart:.2} without");

@@ -34,6 +34,7 @@ fn every_mechanism() -> Value {
     scene["leader_follower"] = json!({ "regions": { "midline": { "polygon": { "points": band } } } });
     scene["durotaxis"] = json!({ "profile": [[0, 200], [300, 800]] });
     scene["bending_stiffness"] = json!({});
+    scene["cone_release"] = json!({ "cues": { "attractant": { "effect": "attract" } } });
     scene
 }
 

@@ -247,8 +247,7 @@ impl March<'_, '_> {
             let count = (1u64 << halvings) as f64;
             let at = |step: u64| if step as f64 == count { to } else { from + (to - from) * (step as f64 / count) };
             let (next, error) = self.step(state, (at(done), at(done + 1)), (to - from) / count)?;
-            // A NaN is no small error.
-            if error <= tolerance || tolerance.is_infinite() {
+            if error <= tolerance {
                 *state = next;
                 done += 1;
                 self.worst = self.worst.max(error);
@@ -259,7 +258,8 @@ impl March<'_, '_> {
                     (halvings, done) = (halvings - 1, done / 2);
                 }
             } else {
-                let more = ((error / tolerance).log2() / 3.0).ceil().clamp(1.0, 6.0) as u32;
+                let excess = if error.is_nan() { f64::INFINITY } else { error / tolerance };
+                let more = (excess.log2() / 3.0).ceil().clamp(1.0, 6.0) as u32;
                 if halvings + more > MOST_HALVINGS {
                     return Err(FieldPathError::NoStep { time: at(done), tolerance });
                 }

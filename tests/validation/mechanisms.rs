@@ -290,6 +290,21 @@ fn axons_that_adhere_to_their_kind_sort_themselves() {
 }
 
 #[test]
+fn cones_bundle_by_what_they_release_and_part_again_where_the_target_switches_a_repellent_on() {
+    let size = |height: usize, set: &[&str]| {
+        let pointer = format!("/morphology/heights/{height}/fascicles/mean_size_per_axon");
+        measured("released_cues", &[], set, at(&pointer))
+    };
+    let (no_attractant, no_repellent) = ("/cone_release/cues/bundling=null", "/cone_release/cues/debundling=null");
+    let (half_way, alone) = (size(1, &[]), size(1, &[no_attractant]));
+    let (near_target, still_bundled) = (size(2, &[]), size(2, &[no_repellent]));
+    println!(
+        "axons a fascicle: half-way {half_way:.1}, {alone:.1} without the attractant; near the target {near_target:.1}, {still_bundled:.1} without the repellent"
+    );
+    assert!(half_way > 1.5 * alone && still_bundled > 2.5 * near_target);
+}
+
+#[test]
 fn the_scenario_of_each_mechanism_shows_its_effect() {
     let straightness = "/morphology/straightness/mean";
     let spread = "/morphology/heights/2/spread_um";

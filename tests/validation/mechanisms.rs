@@ -133,6 +133,23 @@ fn two_cones_begin_to_turn_to_each_other_as_the_field_of_a_disc_says() {
     }
 }
 
+/// Positions are those of the stage, of all cones.
+#[test]
+fn cones_that_feel_each_other_are_followed_with_order_two_in_the_step() {
+    let places = |step: f64| {
+        let cue = json!({ "effect": "repel", "diffusion": 9000, "weight": 2 });
+        let blocks = json!({ "cone_release": { "cues": { "own": cue } } });
+        let axons = [([480.0, 300.0], 80.0, 0.0), ([510.0, 295.0], 100.0, 0.0), ([530.0, 320.0], 120.0, 0.0)];
+        let end = ended(&scene(&axons, 6.0, step, blocks), &roster());
+        cones(end.world()).iter().map(|cone| cone.position).collect::<Vec<_>>()
+    };
+    let fine = places(1.0 / 128.0);
+    let error = |step: f64| places(step).iter().zip(&fine).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
+    let errors = [0.25, 0.125, 0.0625].map(error);
+    let orders = [(errors[0] / errors[1]).log2(), (errors[1] / errors[2]).log2()];
+    assert!(orders.iter().all(|order| (order - 2.0).abs() < 0.25) && errors[0] > 1e-4, "{orders:?} {errors:?}");
+}
+
 /// Which cones release a repellent that a cue of the tissue switches on.
 #[test]
 fn a_release_that_a_cue_activates_begins_where_the_cue_is() {

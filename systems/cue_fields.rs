@@ -4,97 +4,22 @@
 //! load levels that an error check chooses and interpolated between them by cubic Hermite polynomials, with the exact dc/ds;
 //! once in a tissue at rest; never for a cue that no mechanism reads. What cones sample is the concentration and, unless a key
 //! says otherwise, a *recovered*, continuous gradient. Ours: numbers, linear elements with lumped mass by default, sources that
-//! ride the tissue and release per current area.
+//! ride the tissue and release per current area. A transient cue depends on time alone, not on cones: it is solved once, before the
+//! run, as a path in time ([`crate::numerics::transient_field`]).
 
+use super::cue_keys::region;
+pub use super::cue_keys::{Cue, Element, Gradient, Mass, Release, Start, Transport};
 use super::matrix::Loading;
 use crate::model::observables::{Observable, Observables};
-use crate::numerics::field_path::{self, FieldPath, FieldProblem, FieldSolvers, Order};
+use crate::numerics::field_path::{Along, FieldPath, FieldProblem, FieldSolvers, Order};
 use crate::numerics::hermite::Refinement;
-use crate::numerics::reaction_diffusion::{Mass as MassMatrix, ReactionDiffusion};
+use crate::numerics::reaction_diffusion::Mass as MassMatrix;
 use crate::numerics::simplex_mesh::SimplexMesh;
+use crate::numerics::transient_field::solve_in_time;
 use crate::prelude::*;
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::sync::Arc;
-
-/// What stays the same of a source while the tissue deforms.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum Release {
-    /// q per current area: a source that grows releases more.
-    PerArea,
-    /// Σ q |A_j|, as at rest: q falls as the source grows.
-    Total,
-}
-
-/// What moves a cue.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum Transport {
-    /// It diffuses: in equilibrium with its sources at every instant.
-    Diffusing,
-    /// It is bound to the matrix: distributed as at rest, then carried by the tissue and diluted by it, c = c₀/J.
-    Bound,
-}
-
-/// How the degradation term is integrated.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum Mass {
-    /// At the vertices: keeps c ≥ 0 on a Delaunay mesh.
-    Lumped,
-    /// Exactly: smaller error where the mesh resolves √(D/k), undershoots where it does not.
-    Consistent,
-}
-
-/// Order of the finite elements.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum Element {
-    /// P1: c of order 2, its own gradient of order 1.
-    Linear,
-    /// P2: c of order 3, its own gradient of order 2, four times the unknowns on the same mesh.
-    Quadratic,
-}
-
-/// What cones sample as the gradient.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum Gradient {
-    /// A continuous one, made from the values around.
-    Recovered,
-    /// The element's own, which jumps from cell to cell.
-    Raw,
-}
-
-keys! {
-    /// One diffusible cue.
-    pub struct Cue {
-        /// Diffusivity D. Source: Nodal in zebrafish.
-        #[schemars(extend("exclusiveMinimum" = 0.0, "x-typical" = [144.0, 216000.0]))]
-        pub diffusion: Diffusivity = Diffusivity(108_000.0),
-        /// Degradation rate k; decay length ℓ = √(D/k).
-        #[schemars(extend("exclusiveMinimum" = 0.0, "x-typical" = [0.36, 18.0]))]
-        pub degradation: Rate = Rate(3.6),
-        /// Release rate q inside the sources; c → q/k deep inside one. Absent: 50 k · 1 nM. Ours.
-        #[schemars(extend("minimum" = 0.0))]
-        pub release_rate: Option<ReleaseRate> = None,
-        /// What stays the same of the release while the tissue deforms. Ours.
-        pub release: Release = Release::PerArea,
-        /// What moves it once the tissue deforms. Ours.
-        pub transport: Transport = Transport::Diffusing,
-        /// How degradation is integrated. Absent: `lumped` for linear elements, `consistent` for quadratic ones, which know no
-        /// other. Ours.
-        pub mass: Option<Mass> = None,
-        /// Order of the finite elements. Ours.
-        pub element: Element = Element::Linear,
-        /// What cones sample as the gradient. Ours.
-        pub gradient: Gradient = Gradient::Recovered,
-        /// Where it is released.
-        #[schemars(length(min = 1))]
-        pub sources: Vec<Shape> = Vec::new(),
-    }
-}
 
 /// The diffusible cues of a scene, by name (eq. 2); −DΔc + kc = Σ q 1_A in Ω_M(t).
 #[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
@@ -113,22 +38,7 @@ impl Mechanism for Cues {
     fn check(&self, _facts: &Facts) -> Violations {
         let mut wrong = Violations::new();
         for (name, cue) in &self.0 {
-            wrong.demand(!cue.sources.is_empty(), &format!("/{name}/sources"), || {
-                "a cue needs at least one source, such as {\"disc\": {\"centre\": [400, 540], \"radius\": 50}}".into()
-            });
-            let lumped = cue.element == Element::Quadratic && cue.mass == Some(Mass::Lumped);
-            wrong.demand(!lumped, &format!("/{name}/mass"), || {
-                "quadratic elements have no lumped mass (it would be zero at the vertices); leave `mass` out, or take linear elements".into()
-            });
-            let bound = cue.transport == Transport::Bound && cue.element == Element::Quadratic;
-            wrong.demand(!bound, &format!("/{name}/element"), || {
-                "a cue that is bound to the matrix takes linear elements".into()
-            });
-            for (i, shape) in cue.sources.iter().enumerate() {
-                if let Err(found) = shape.check() {
-                    wrong.extend_under(&format!("/{name}/sources/{i}"), found);
-                }
-            }
+            wrong.extend_under(&format!("/{name}"), cue.check());
         }
         wrong
     }
@@ -145,7 +55,7 @@ impl Mechanism for Cues {
         let mut solvers = FieldSolvers::new(&tissue.mesh, tissue.regions.values().cloned().collect());
         let mut worst = vec![0.0; tissue.mesh.cell_count()];
         for (name, cue) in &self.0 {
-            let errors = problem(tissue, (name, cue), &tissue.mesh).gradient_errors(&mut solvers);
+            let errors = cue.problem(tissue, name, &tissue.mesh).gradient_errors(&mut solvers);
             let errors = errors.map_err(|error| failed(name, error))?;
             worst.iter_mut().zip(errors).for_each(|(worst, error)| *worst = error.max(*worst));
         }
@@ -157,11 +67,6 @@ impl Mechanism for Cues {
         model.term(Term::Fields, bring_fields);
         Ok(())
     }
-}
-
-/// Name of the mesh region of a cue's source.
-fn region(cue: &str, source: usize) -> String {
-    format!("cues/{cue}/sources/{source}")
 }
 
 /// Concentration and gradient of a cue at a place.
@@ -198,8 +103,35 @@ struct Solved {
 pub struct CueFields {
     names: Vec<String>,
     solved: Arc<Solved>,
-    current: Vec<Vec<f64>>,
-    load: Option<f64>,
+    current: Vec<Current>,
+}
+
+/// The values of a field at a parameter of its path.
+#[derive(Debug)]
+struct Current {
+    parameter: Option<f64>,
+    values: Vec<f64>,
+}
+
+/// Load of the tissue and time (h) at which fields are wanted.
+#[derive(Debug, Clone, Copy)]
+struct Moment {
+    load: f64,
+    time: f64,
+}
+
+impl Moment {
+    fn of(world: &World) -> Self {
+        Self { load: world.resource::<Configuration>().load, time: world.resource::<StageTime>().0 }
+    }
+
+    /// The parameter of a field's path.
+    fn along(&self, field: &FieldPath) -> f64 {
+        match field.along {
+            Along::Load => self.load,
+            Along::Time => self.time,
+        }
+    }
 }
 
 impl CueFields {
@@ -225,7 +157,7 @@ impl CueFields {
     /// Concentration and gradient of cue `index` at a site.
     #[inline]
     pub fn sample(&self, mesh: &SimplexMesh<2>, index: usize, site: Site) -> CueSample {
-        self.sample_from(mesh, index, &self.current[index], site)
+        self.sample_from(mesh, index, &self.current[index].values, site)
     }
 
     #[inline]
@@ -236,40 +168,42 @@ impl CueFields {
         CueSample { concentration: c.max(0.0), gradient: Vector3::new(gradient[0], gradient[1], 0.0) }
     }
 
-    fn bring_to(&mut self, load: f64) {
-        if self.load != Some(load) {
-            for (field, values) in self.solved.fields.iter().zip(&mut self.current) {
-                field.path.evaluate(load, values);
+    fn bring_to(&mut self, moment: Moment) {
+        for (field, current) in self.solved.fields.iter().zip(&mut self.current) {
+            let parameter = moment.along(field);
+            if current.parameter != Some(parameter) {
+                field.path.evaluate(parameter, &mut current.values);
+                current.parameter = Some(parameter);
             }
-            self.load = Some(load);
         }
     }
 
-    /// The values of a field at a load: those in use, or interpolated anew where another load was last brought.
-    fn at(&self, index: usize, load: f64) -> Cow<'_, [f64]> {
-        if self.load == Some(load) {
-            return Cow::Borrowed(&self.current[index]);
+    /// The values of a field at a moment: those in use, or interpolated anew where another one was last brought.
+    fn at(&self, index: usize, moment: Moment) -> Cow<'_, [f64]> {
+        let field = &self.solved.fields[index];
+        let parameter = moment.along(field);
+        if self.current[index].parameter == Some(parameter) {
+            return Cow::Borrowed(&self.current[index].values);
         }
-        let path = &self.solved.fields[index].path;
-        let mut values = vec![0.0; path.components()];
-        path.evaluate(load, &mut values);
+        let mut values = vec![0.0; field.path.components()];
+        field.path.evaluate(parameter, &mut values);
         Cow::Owned(values)
     }
 }
 
-fn bring_fields(configuration: Res<Configuration>, mut fields: ResMut<CueFields>) {
-    fields.bring_to(configuration.load);
+fn bring_fields(configuration: Res<Configuration>, stage: Res<StageTime>, mut fields: ResMut<CueFields>) {
+    fields.bring_to(Moment { load: configuration.load, time: stage.0 });
 }
 
 fn read_concentration(world: &World, index: usize) -> Vec<f64> {
     let (fields, vertices) = (world.resource::<CueFields>(), world.resource::<Tissue>().mesh.vertex_count());
-    let values = fields.at(index, world.resource::<Configuration>().load);
+    let values = fields.at(index, Moment::of(world));
     fields.solved.fields[index].layout.concentrations(&values).take(vertices).map(|c| c.max(0.0)).collect()
 }
 
 fn read_sample(world: &World, index: usize, site: Site) -> (f64, Vector3<f64>) {
     let fields = world.resource::<CueFields>();
-    let values = fields.at(index, world.resource::<Configuration>().load);
+    let values = fields.at(index, Moment::of(world));
     let sample = fields.sample_from(&world.resource::<Tissue>().mesh, index, &values, site);
     (sample.concentration, sample.gradient)
 }
@@ -283,7 +217,13 @@ fn solve_demanded(world: &mut World) -> Result<(), InstallError> {
     let chosen: Vec<(&str, &Cue)> =
         demanded.iter().filter_map(|name| cues.get_key_value(name)).map(|(name, cue)| (name.as_str(), cue)).collect();
     let moved = world.get_resource::<Loading>().map_or("at rest", Loading::inputs);
-    let inputs = format!("{} {moved} {chosen:?}", world.resource::<Tissue>().inputs);
+    let mut inputs = format!("{} {moved} {chosen:?}", world.resource::<Tissue>().inputs);
+    if chosen.iter().any(|(_, cue)| cue.transport == Transport::Transient) {
+        let Clock { grid, end, .. } = *world.resource::<Clock>();
+        inputs += &format!(" to {:?} h", grid.hours(end));
+        let mut kinks = world.get_resource_or_init::<Kinks>();
+        chosen.iter().flat_map(|(_, cue)| cue.switches()).for_each(|time| kinks.add(grid.nearest(time)));
+    }
     let (solved, new) = world.resource::<Shelf>().take(&inputs, || solve(world, &chosen))?;
     for (index, ((name, cue), field)) in chosen.iter().zip(&solved.fields).enumerate() {
         let name = (*name).to_owned();
@@ -297,8 +237,9 @@ fn solve_demanded(world: &mut World) -> Result<(), InstallError> {
         counters.cue_factorisations += solved.factorisations as u64;
     }
     let names = chosen.into_iter().map(|(name, _)| name.to_owned()).collect();
-    let current = solved.fields.iter().map(|field| vec![0.0; field.path.components()]).collect();
-    world.insert_resource(CueFields { names, solved, current, load: None });
+    let empty = |field: &FieldPath| Current { parameter: None, values: vec![0.0; field.path.components()] };
+    let current = solved.fields.iter().map(empty).collect();
+    world.insert_resource(CueFields { names, solved, current });
     Ok(())
 }
 
@@ -308,11 +249,16 @@ fn solve(world: &World, cues: &[(&str, &Cue)]) -> Result<Solved, InstallError> {
     let (mesh, rest) = (&*tissue.mesh, tissue.mesh.vertices());
     let goal = Refinement { tolerance: LEVEL_TOLERANCE, max_levels: MOST_LEVELS };
     let mut solvers = FieldSolvers::new(mesh, tissue.regions.values().cloned().collect());
+    let loading = world.get_resource::<Loading>();
+    let clock = world.resource::<Clock>();
+    let at_load = |load: f64| loading.map_or_else(Default::default, |loading| loading.configuration(rest, load));
+    let at_time = |time: f64| loading.map_or_else(Default::default, |loading| loading.motion(rest, time));
     let mut field = |(name, cue): &(&str, &Cue)| {
-        let problem = problem(tissue, (name, cue), mesh);
-        match world.get_resource::<Loading>() {
-            None => problem.solve(&mut solvers, None, goal),
-            Some(loading) => problem.solve(&mut solvers, Some(&|load| loading.configuration(rest, load)), goal),
+        let problem = cue.problem(tissue, name, mesh);
+        let kinks = loading.map_or_else(Vec::new, Loading::kinks);
+        match cue.course(clock.grid.hours(clock.end), kinks) {
+            None => problem.solve(&mut solvers, loading.map(|_| &at_load as _), goal),
+            Some(course) => solve_in_time(&problem, &mut solvers, loading.map(|_| &at_time as _), &course),
         }
         .map_err(|error| failed(name, error))
     };
@@ -324,10 +270,15 @@ fn solve(world: &World, cues: &[(&str, &Cue)]) -> Result<Solved, InstallError> {
 /// Notes what a cue took and where it falls short.
 fn report(world: &mut World, (name, cue): (&str, &Cue), field: &FieldPath) {
     let mesh = Arc::clone(&world.resource::<Tissue>().mesh);
-    let problem = problem(world.resource::<Tissue>(), (name, cue), &mesh);
+    let problem = cue.problem(world.resource::<Tissue>(), name, &mesh);
     note(&mut world.resource_mut::<Health>(), name, field);
     let (levels, unknowns) = (field.path.levels().len(), field.unknowns());
-    let times = if levels == 1 { "once".to_owned() } else { format!("at {levels} load levels") };
+    let steps = field.report.solves;
+    let (times, solves) = match field.along {
+        Along::Time => (format!("in {steps} steps of time, {levels} levels kept"), steps),
+        Along::Load if levels == 1 => ("once".to_owned(), levels),
+        Along::Load => (format!("at {levels} load levels"), levels),
+    };
     let kind = if problem.order == Order::Quadratic { " of quadratic elements" } else { "" };
     let mut plan = world.resource_mut::<Plan>();
     plan.keep(format!("cue `{name}`"), format!("read; {unknowns} unknowns{kind}, solved {times}"));
@@ -335,7 +286,7 @@ fn report(world: &mut World, (name, cue): (&str, &Cue), field: &FieldPath) {
     let part = format!("cue `{name}`");
     let current = size_of::<f64>() * field.path.components();
     plan.hold(&part, (field.path.bytes() + current) as f64, Each::Run);
-    plan.work(&part, Work::FieldUnknown, (levels * unknowns) as f64, Each::Run);
+    plan.work(&part, Work::FieldUnknown, (solves * unknowns) as f64, Each::Run);
     if levels > 1 {
         plan.work(&part, Work::Interpolated, field.path.components() as f64, Each::Stage);
     }
@@ -343,33 +294,6 @@ fn report(world: &mut World, (name, cue): (&str, &Cue), field: &FieldPath) {
 
 fn failed(cue: &str, error: impl std::fmt::Display) -> InstallError {
     InstallError::Solve(format!("cue `{cue}` (eq. 2): {error}"))
-}
-
-/// The cue as a problem of numerics.
-fn problem<'m>(tissue: &Tissue, (name, cue): (&str, &Cue), mesh: &'m SimplexMesh<2>) -> FieldProblem<'m> {
-    let (order, usual) = match cue.element {
-        Element::Linear => (Order::Linear, Mass::Lumped),
-        Element::Quadratic => (Order::Quadratic, Mass::Consistent),
-    };
-    let mass = match cue.mass.unwrap_or(usual) {
-        Mass::Lumped => MassMatrix::Lumped,
-        Mass::Consistent => MassMatrix::Consistent,
-    };
-    let gradient = match cue.gradient {
-        Gradient::Recovered => field_path::Gradient::Recovered,
-        Gradient::Raw => field_path::Gradient::Raw,
-    };
-    let cells = |i: usize| tissue.regions.get(&region(name, i)).cloned().unwrap_or_default();
-    FieldProblem {
-        mesh,
-        equation: ReactionDiffusion { diffusion: cue.diffusion.0, degradation: cue.degradation.0, mass },
-        order,
-        gradient,
-        sources: (0..cue.sources.len()).map(cells).collect(),
-        release_rate: cue.release_rate.map_or(50.0 * cue.degradation.0, |q| q.0),
-        bound: cue.transport == Transport::Bound,
-        keeps_total: cue.release == Release::Total,
-    }
 }
 
 /// Edges may be this much longer than advised: meshes come out a little coarser than asked for.
@@ -418,9 +342,13 @@ fn mean_edge(mesh: &SimplexMesh<2>) -> f64 {
 
 fn note(health: &mut Health, name: &str, field: &FieldPath) {
     let (path, report) = (&field.path, field.report);
-    if let Some(load) = field.flipped_from {
+    if let Some(parameter) = field.flipped_from {
+        let when = match field.along {
+            Along::Load => format!("load {parameter:.3}"),
+            Along::Time => format!("{parameter:.3} h"),
+        };
         health.note(format!(
-            "cue `{name}`: by load {load:.3} the tissue's mesh is no longer Delaunay; edges are flipped for its field (vertices stay)"
+            "cue `{name}`: by {when} the tissue's mesh is no longer Delaunay; edges are flipped for its field (vertices stay)"
         ));
     }
     if !report.met {

@@ -359,6 +359,18 @@ impl Loading {
         (loads[piece - 1].0 + rate * (time - start), rate)
     }
 
+    /// Times at which the rate of the load jumps (h).
+    pub fn kinks(&self) -> Vec<f64> {
+        self.curve.times.iter().map(|time| time.0).collect()
+    }
+
+    /// Coordinates (µm) and velocities (µm/h) at a time (h); at a corner of the load curve those of the piece before.
+    pub fn motion(&self, rest: &[[f64; 2]], time: f64) -> (Vec<[f64; 2]>, Vec<[f64; 2]>) {
+        let (load, rate) = self.at(time);
+        let (moved, slope) = self.configuration(rest, load);
+        (moved, slope.into_iter().map(|u| u.map(|du| du * rate)).collect())
+    }
+
     /// Coordinates (µm) and their derivative with respect to the load, at a load.
     pub fn configuration(&self, rest: &[[f64; 2]], load: f64) -> (Vec<[f64; 2]>, Vec<[f64; 2]>) {
         let mut flat = vec![0.0; 2 * rest.len()];

@@ -4,7 +4,9 @@ pub mod bending_stiffness;
 pub mod borders;
 pub mod branching;
 pub mod chemotaxis;
+pub mod cone_release;
 pub mod cue_fields;
+pub mod cue_keys;
 pub mod durotaxis;
 pub mod fasciculation;
 pub mod growth_rate_modulation;
@@ -24,6 +26,7 @@ pub fn standard() -> Roster {
         .with::<matrix::Matrix>()
         .with::<cue_fields::Cues>()
         .with::<chemotaxis::Chemotaxis>()
+        .with::<cone_release::ConeRelease>()
         .with::<growth_rate_modulation::GrowthRateModulation>()
         .with::<fasciculation::Fasciculation>()
         .with::<steric_repulsion::StericRepulsion>()

@@ -43,6 +43,7 @@ fn every_mechanism() -> Value {
             json!({ "count": 1, "origin": { "points": [[x, 5]] }, "heading": heading, "births": { "at": 0 } });
     }
     scene["zippering"] = json!({ "arm": "2 um" });
+    scene["cone_release"] = json!({ "cues": { "attractant": { "effect": "attract" } } });
     scene
 }
 

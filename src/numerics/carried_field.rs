@@ -17,6 +17,18 @@ pub fn volumes_around<const D: usize>(mesh: &SimplexMesh<D>, coordinates: &[[f64
     gathered(mesh, |cell| mesh.volume(coordinates, cell))
 }
 
+/// Derivative of [`volumes_around`] while the vertices move with `velocity` dx/ds.
+pub fn volume_rates_around<const D: usize>(
+    mesh: &SimplexMesh<D>,
+    coordinates: &[[f64; D]],
+    velocity: &[[f64; D]],
+) -> Vec<f64> {
+    gathered(mesh, |cell| {
+        let element = Element::new(mesh, coordinates, cell);
+        mesh.volume(coordinates, cell) * divergence(&element.velocity_gradient(velocity))
+    })
+}
+
 /// c and dc/ds of a field that had the values `at_rest` (one entry a vertex) before the vertices came to `coordinates` (µm), where they move
 /// with `velocity` dx/ds.
 pub fn carried<const D: usize>(
@@ -26,10 +38,7 @@ pub fn carried<const D: usize>(
     velocity: &[[f64; D]],
 ) -> (Vec<f64>, Vec<f64>) {
     let (before, now) = (volumes_around(mesh, mesh.vertices()), volumes_around(mesh, coordinates));
-    let growth = gathered(mesh, |cell| {
-        let element = Element::new(mesh, coordinates, cell);
-        mesh.volume(coordinates, cell) * divergence(&element.velocity_gradient(velocity))
-    });
+    let growth = volume_rates_around(mesh, coordinates, velocity);
     let value = |i: usize| at_rest[i] * before[i] / now[i];
     (0..at_rest.len()).map(|i| (value(i), -value(i) * growth[i] / now[i])).unzip()
 }

@@ -49,6 +49,22 @@ pub enum FieldPathError {
     /// The levels make no path.
     #[error(transparent)]
     Levels(#[from] HermiteError),
+    /// A field in time does not come within its tolerance.
+    #[error("at {time:.6} h no step, however short, keeps the error of the field within the tolerance {tolerance:.1e}")]
+    NoStep {
+        /// Where (h).
+        time: f64,
+        /// The tolerance.
+        tolerance: f64,
+    },
+    /// A field in time needs too many levels.
+    #[error("{levels} levels in time reach no farther than {time:.6} h; a larger tolerance needs fewer")]
+    TooManyLevels {
+        /// Levels allowed.
+        levels: usize,
+        /// Where they end (h).
+        time: f64,
+    },
 }
 
 /// Vertex coordinates (µm) at a load and their derivative with respect to it.
@@ -81,7 +97,9 @@ impl<'m> FieldSolvers<'m> {
         })
     }
 
-    fn linear(&mut self) -> Result<&mut (StationarySolver<'m, 2>, GradientRecovery<2>), ReactionDiffusionError> {
+    pub(crate) fn linear(
+        &mut self,
+    ) -> Result<&mut (StationarySolver<'m, 2>, GradientRecovery<2>), ReactionDiffusionError> {
         match &mut self.linear {
             Some(known) => Ok(known),
             none => {
@@ -97,6 +115,15 @@ impl<'m> FieldSolvers<'m> {
             none => Ok(none.insert(QuadraticSolver::new(self.mesh)?)),
         }
     }
+}
+
+/// What the parameter of a field's path is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Along {
+    /// The load of the tissue, in [0, 1].
+    Load,
+    /// Time (h).
+    Time,
 }
 
 /// A field of linear elements in one configuration, one entry a vertex.
@@ -142,13 +169,15 @@ pub struct FieldProblem<'m> {
 /// A solved field.
 #[derive(Debug)]
 pub struct FieldPath {
-    /// c and ∇c along the load.
+    /// c and ∇c along the parameter.
     pub path: HermitePath,
+    /// What the parameter is.
+    pub along: Along,
     /// What stands where in it.
     pub layout: FieldLayout,
     /// What the choice of levels came to.
     pub report: RefinementReport,
-    /// The least load at which edges were flipped (linear elements only).
+    /// The least parameter at which edges were flipped (linear elements only).
     pub flipped_from: Option<f64>,
     /// How near the meshes of all levels, edges flipped, come to losing the discrete maximum principle; none for quadratic
     /// elements, which have no such principle.
@@ -199,7 +228,7 @@ impl FieldProblem<'_> {
                 refine(&[0.0, 0.5, 1.0], evaluate, defect, goal)?
             }
         };
-        Ok(FieldPath { path, layout, report, flipped_from, monotonicity })
+        Ok(FieldPath { path, along: Along::Load, layout, report, flipped_from, monotonicity })
     }
 
     /// The [estimate](gradient_errors) of every cell at rest, by linear elements whatever the order.
@@ -213,7 +242,7 @@ impl FieldProblem<'_> {
         Ok(gradient_errors(self.mesh, &c, &recovery.recover(rest, &c, true), self.equation.decay_length()))
     }
 
-    fn layout(&self, solvers: &mut FieldSolvers) -> Result<FieldLayout, ReactionDiffusionError> {
+    pub(crate) fn layout(&self, solvers: &mut FieldSolvers) -> Result<FieldLayout, ReactionDiffusionError> {
         Ok(match (self.order, self.gradient) {
             (Order::Linear, Gradient::Recovered) => FieldLayout::Vertices,
             (Order::Linear, Gradient::Raw) => FieldLayout::Cells(self.mesh.vertex_count()),
@@ -256,20 +285,32 @@ impl FieldProblem<'_> {
             None => (self.nodal(solvers, at, motion)?, true),
         };
         let (_, recovery) = solvers.linear()?;
+        let found = self.with_gradients(recovery, layout, (at, motion), (&c, &slope), no_flux);
+        Ok(Level { found, flipped, edges })
+    }
+
+    /// c and ∇c of linear elements in one vector, and their slopes.
+    pub(crate) fn with_gradients(
+        &self,
+        recovery: &GradientRecovery<2>,
+        layout: &FieldLayout,
+        (at, motion): (&[[f64; 2]], Option<&[[f64; 2]]>),
+        (c, slope): (&[f64], &[f64]),
+        no_flux: bool,
+    ) -> ValueAndSlope {
         let (gradient, gradient_slope) = match (self.gradient, motion) {
             (Gradient::Raw, _) => {
                 let still = vec![[0.0; 2]; at.len()];
                 let velocity = motion.unwrap_or(&still);
-                linear_gradients(self.mesh, &MovingField { coordinates: at, velocity, values: &c, rates: &slope })
+                linear_gradients(self.mesh, &MovingField { coordinates: at, velocity, values: c, rates: slope })
             }
-            (Gradient::Recovered, None) => (recovery.recover(at, &c, no_flux), vec![[0.0; 2]; at.len()]),
+            (Gradient::Recovered, None) => (recovery.recover(at, c, no_flux), vec![[0.0; 2]; at.len()]),
             (Gradient::Recovered, Some(motion)) => {
-                let rate = recovered_slope(recovery, (at, motion), (&c, &slope), no_flux);
-                (recovery.recover(at, &c, no_flux), rate)
+                let rate = recovered_slope(recovery, (at, motion), (c, slope), no_flux);
+                (recovery.recover(at, c, no_flux), rate)
             }
         };
-        let found = (layout.pack(&c, &gradient), layout.pack(&slope, &gradient_slope));
-        Ok(Level { found, flipped, edges })
+        (layout.pack(c, &gradient), layout.pack(slope, &gradient_slope))
     }
 
     fn quadratic_level(
@@ -296,7 +337,7 @@ impl FieldProblem<'_> {
         Ok(Level { found, flipped: false, edges: None })
     }
 
-    fn sources_at<'s>(&'s self, at: &[[f64; 2]], motion: Option<&[[f64; 2]]>) -> Vec<Source<'s>> {
+    pub(crate) fn sources_at<'s>(&'s self, at: &[[f64; 2]], motion: Option<&[[f64; 2]]>) -> Vec<Source<'s>> {
         let source = |cells: &'s Vec<u32>| {
             if !self.keeps_total {
                 return Source::new(cells, self.release_rate);
@@ -318,7 +359,8 @@ fn recovered_slope(
 ) -> Vec<[f64; 2]> {
     let fastest = motion.iter().flatten().fold(0.0f64, |m, w| m.max(w.abs()));
     if fastest == 0.0 {
-        return vec![[0.0; 2]; c.len()];
+        let still = slope.iter().all(|slope| *slope == 0.0);
+        return if still { vec![[0.0; 2]; c.len()] } else { recovery.recover(at, slope, no_flux) };
     }
     let step = 1e-3 / fastest;
     let shifted = |sign: f64| {

@@ -1,6 +1,7 @@
 //! The mathematics: meshes, finite elements, turning law. Knows no ECS, no JSON, no files.
 
 pub mod arrangement;
+pub mod bessel;
 pub mod carried_field;
 pub mod contact_integral;
 mod cue_element;
@@ -33,6 +34,7 @@ pub mod runge_kutta;
 pub mod segments;
 pub mod simplex_mesh;
 pub mod sparse;
+pub mod transient_field;
 pub mod triangulate;
 pub mod turning;
 mod vector;

@@ -18,6 +18,7 @@
 //! (same vertices, see [`crate::numerics::delaunay`]), so that lumped solutions stay non-negative. Lumped decay and sources stay
 //! on the original connectivity: the stiffness matrix is continuous through a flip, and so is then the field.
 
+use std::borrow::Cow;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -188,11 +189,13 @@ impl<'m, const D: usize> StationarySolver<'m, D> {
     pub fn system<'a>(
         &mut self,
         law: &ReactionDiffusion,
-        coordinates: &'a [[f64; D]],
+        coordinates: impl Into<Cow<'a, [[f64; D]]>>,
     ) -> Result<StationarySystem<'a, D>, ReactionDiffusionError>
     where
         'm: 'a,
     {
+        let given = coordinates.into();
+        let coordinates = &*given;
         check_law(law)?;
         check_length("coordinates", coordinates.len(), self.mesh.vertex_count())?;
         check_volumes(self.mesh, coordinates)?;
@@ -205,7 +208,7 @@ impl<'m, const D: usize> StationarySolver<'m, D> {
         let factor = assemble(law, meshes, coordinates, &pattern).cholesky()?;
         self.factorisations += 1;
         let solves = Arc::clone(&self.solves);
-        Ok(StationarySystem { law: *law, original: self.mesh, flipped, triangles, coordinates, factor, solves })
+        Ok(StationarySystem { law: *law, original: self.mesh, flipped, triangles, coordinates: given, factor, solves })
     }
 
     /// The field c (nM, one entry a vertex) of the given sources in a configuration.
@@ -264,7 +267,7 @@ pub struct StationarySystem<'a, const D: usize> {
     original: &'a SimplexMesh<D>,
     flipped: Option<Arc<SimplexMesh<D>>>,
     triangles: Option<Triangles>,
-    coordinates: &'a [[f64; D]],
+    coordinates: Cow<'a, [[f64; D]]>,
     factor: Factor,
     solves: Arc<AtomicUsize>,
 }
@@ -273,6 +276,11 @@ impl<const D: usize> StationarySystem<'_, D> {
     /// The connectivity in use: the mesh's, or one with the same vertices and flipped edges.
     pub fn mesh(&self) -> &SimplexMesh<D> {
         self.flipped.as_deref().unwrap_or(self.original)
+    }
+
+    /// The configuration that the system was set up in (µm).
+    pub fn coordinates(&self) -> &[[f64; D]] {
+        &self.coordinates
     }
 
     fn meshes(&self) -> Connectivities<'_, D> {
@@ -286,7 +294,7 @@ impl<const D: usize> StationarySystem<'_, D> {
 
     /// What the edges of the connectivity in use look like, in the plane.
     pub fn edge_report(&self) -> Option<EdgeReport> {
-        let (plane, triangles) = (in_plane(self.coordinates)?, self.triangles.as_ref()?);
+        let (plane, triangles) = (in_plane(&self.coordinates)?, self.triangles.as_ref()?);
         Some(triangles.edge_report(&plane, self.law.diffusion, self.law.degradation))
     }
 
@@ -295,12 +303,7 @@ impl<const D: usize> StationarySystem<'_, D> {
     /// # Errors
     /// A source that names a cell outside the mesh.
     pub fn load(&self, sources: &[Source]) -> Result<Vec<f64>, ReactionDiffusionError> {
-        let mut load = vec![0.0; self.original.vertex_count()];
-        self.for_source_cells(sources, |element, source| {
-            let share = source.density * element.volume / (D + 1) as f64;
-            element.corners.iter().for_each(|&vertex| load[vertex as usize] += share);
-        })?;
-        Ok(load)
+        source_load((self.original, &self.coordinates), sources)
     }
 
     /// The field of a general load vector (nM µm^D/h, one entry a vertex).
@@ -334,13 +337,13 @@ impl<const D: usize> StationarySystem<'_, D> {
         check_length("the velocity", velocity.len(), self.original.vertex_count())?;
         let field = self.solve(sources)?;
         let mut rate = vec![0.0; field.len()];
-        self.for_source_cells(sources, |element, source| {
+        for_source_cells((self.original, &self.coordinates), sources, |element, source| {
             let divergence = divergence(&element.velocity_gradient(velocity));
             let density = source.density_rate + source.density * divergence;
             let share = density * element.volume / (D + 1) as f64;
             element.corners.iter().for_each(|&vertex| rate[vertex as usize] += share);
         })?;
-        subtract_matrix_rate(&self.law, self.meshes(), (self.coordinates, velocity), &field, &mut rate);
+        subtract_matrix_rate(&self.law, self.meshes(), (&self.coordinates, velocity), &field, &mut rate);
         let rate = self.solve_load(rate)?;
         Ok((field, rate))
     }
@@ -355,31 +358,46 @@ impl<const D: usize> StationarySystem<'_, D> {
         let content: f64 = (0..mesh.cell_count())
             .map(|cell| {
                 let sum: f64 = mesh.cell(cell).iter().map(|&v| field[v as usize]).sum();
-                mesh.volume(self.coordinates, cell) * sum / (D + 1) as f64
+                mesh.volume(&self.coordinates, cell) * sum / (D + 1) as f64
             })
             .sum();
         let released = self.load(sources)?.iter().sum();
         let minimum = field.iter().copied().fold(f64::INFINITY, f64::min);
         Ok(Budget { degraded: self.law.degradation * content, released, minimum })
     }
+}
 
-    fn for_source_cells(
-        &self,
-        sources: &[Source],
-        mut visit: impl FnMut(&Element<D>, &Source),
-    ) -> Result<(), ReactionDiffusionError> {
-        let mesh = self.original;
-        for (source_index, source) in sources.iter().enumerate() {
-            for &cell in source.cells {
-                if cell as usize >= mesh.cell_count() {
-                    let count = mesh.cell_count();
-                    return Err(ReactionDiffusionError::NoSuchCell { source_index, cell, count });
-                }
-                visit(&Element::new(mesh, self.coordinates, cell as usize), source);
+/// The load `f_i = ∫ Σ q 1_A λ_i` of sources on a mesh at the given coordinates (nM µm^D/h, one entry a vertex).
+///
+/// # Errors
+/// A source that names a cell outside the mesh.
+pub fn source_load<const D: usize>(
+    place: (&SimplexMesh<D>, &[[f64; D]]),
+    sources: &[Source],
+) -> Result<Vec<f64>, ReactionDiffusionError> {
+    let mut load = vec![0.0; place.0.vertex_count()];
+    for_source_cells(place, sources, |element, source| {
+        let share = source.density * element.volume / (D + 1) as f64;
+        element.corners.iter().for_each(|&vertex| load[vertex as usize] += share);
+    })?;
+    Ok(load)
+}
+
+fn for_source_cells<const D: usize>(
+    (mesh, coordinates): (&SimplexMesh<D>, &[[f64; D]]),
+    sources: &[Source],
+    mut visit: impl FnMut(&Element<D>, &Source),
+) -> Result<(), ReactionDiffusionError> {
+    for (source_index, source) in sources.iter().enumerate() {
+        for &cell in source.cells {
+            if cell as usize >= mesh.cell_count() {
+                let count = mesh.cell_count();
+                return Err(ReactionDiffusionError::NoSuchCell { source_index, cell, count });
             }
+            visit(&Element::new(mesh, coordinates, cell as usize), source);
         }
-        Ok(())
     }
+    Ok(())
 }
 
 pub(crate) fn check_law(law: &ReactionDiffusion) -> Result<(), ReactionDiffusionError> {

@@ -28,7 +28,7 @@ const SEAM_FILES: &[&str] = &[
 ];
 
 /// Files of `systems/` that other mechanisms may name.
-const PROVIDERS: &[&str] = &["cue_fields", "matrix", "shaft_index"];
+const PROVIDERS: &[&str] = &["cue_fields", "cue_keys", "matrix", "shaft_index"];
 
 const ROOMS: &[Room] = &[
     Room {

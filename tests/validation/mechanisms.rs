@@ -1,10 +1,14 @@
 //! The mechanisms from the literature through the whole program: closed forms of what an axon does, no effect at no strength, and the
 //! effect that each one's scenario shows.
 
-use crate::common::{cones, ended, hash_of_states, loaded, recorded, try_load};
+use crate::common::{cones, ended, hash_of_states, loaded, recorded, to_end, try_load};
 use crate::fixed_pull::roster;
 use serde_json::{Map, Value, json};
+use tropism::model::births::Origin;
+use tropism::numerics::bessel;
+use tropism::prelude::Tissue;
 use tropism::scenario::load::Request;
+use tropism::simulation::Simulation;
 use tropism::study::run::read;
 
 pub(crate) const SPEED: f64 = 20.0;
@@ -104,6 +108,67 @@ fn two_axons_closer_than_the_distance_part_and_others_run_on() {
     assert!((parted(6.0) - 6.0).abs() < 1e-9);
 }
 
+/// Two cones side by side at a distance r begin to turn at κ s, s the difference in receptor occupancy in the other one's K₀.
+#[test]
+fn two_cones_begin_to_turn_to_each_other_as_the_field_of_a_disc_says() {
+    let (r, a, length, level) = (40.0, 5.0, 50.0f64, 30.0);
+    let (k0, k1, i1) = {
+        let ([k0, k1], [_, i1]) = (bessel::decaying(r / length), bessel::growing(a / length));
+        (k0, k1, i1)
+    };
+    let c = level * (a / length) * i1 * k0;
+    let slope = level * (a / length) * i1 * k1 / length;
+    let (turning_rate, time) = (0.93, 0.01);
+    let expected = turning_rate * time * 10.0 * slope / ((1.0 + c) * (1.0 + c)) / 0.025;
+    assert!(expected > 1e-3, "{expected}");
+    for (effect, sign) in [("attract", 1.0), ("repel", -1.0)] {
+        let cue = json!({ "effect": effect, "diffusion": 2500 * 4, "degradation": 4, "release_rate": 4.0 * level });
+        let blocks = json!({ "cone_release": { "cues": { "own": cue } }, "growth": { "turning_rate": turning_rate } });
+        let axons = [([480.0, 500.0], 90.0, 0.0), ([480.0 + r, 500.0], 90.0, 0.0), ([20.0, 20.0], 90.0, 0.0)];
+        let end = ended(&scene(&axons, time, time, blocks), &roster());
+        let headings: Vec<f64> = cones(end.world()).iter().map(|cone| cone.spring.heading.x).collect();
+        assert!((headings[0] - sign * expected).abs() < 1e-3 * expected, "{} {expected}", headings[0]);
+        assert!((headings[1] + sign * expected).abs() < 1e-3 * expected);
+        assert!(headings[2].abs() < 1e-15, "beyond eight decay lengths: {}", headings[2]);
+    }
+}
+
+/// Positions are those of the stage, of all cones.
+#[test]
+fn cones_that_feel_each_other_are_followed_with_order_two_in_the_step() {
+    let places = |step: f64| {
+        let cue = json!({ "effect": "repel", "diffusion": 9000, "weight": 2 });
+        let blocks = json!({ "cone_release": { "cues": { "own": cue } } });
+        let axons = [([480.0, 300.0], 80.0, 0.0), ([510.0, 295.0], 100.0, 0.0), ([530.0, 320.0], 120.0, 0.0)];
+        let end = ended(&scene(&axons, 6.0, step, blocks), &roster());
+        cones(end.world()).iter().map(|cone| cone.position).collect::<Vec<_>>()
+    };
+    let fine = places(1.0 / 128.0);
+    let error = |step: f64| places(step).iter().zip(&fine).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
+    let errors = [0.25, 0.125, 0.0625].map(error);
+    let orders = [(errors[0] / errors[1]).log2(), (errors[1] / errors[2]).log2()];
+    assert!(orders.iter().all(|order| (order - 2.0).abs() < 0.25) && errors[0] > 1e-4, "{orders:?} {errors:?}");
+}
+
+/// Which cones release a repellent that a cue of the tissue switches on.
+#[test]
+fn a_release_that_a_cue_activates_begins_where_the_cue_is() {
+    let disc = json!({ "disc": { "centre": [500, 900], "radius": 60 } });
+    let parted = |height: f64| {
+        let activation = json!({ "cue": "target", "half_at": 1, "steepness": 4 });
+        let blocks = json!({
+            "cues": { "target": { "diffusion": "1 um^2/s", "sources": [disc] } },
+            "cone_release": { "cues": { "own": { "effect": "repel", "activated_by": activation } } }
+        });
+        let axons = [([490.0, height], 90.0, 0.0), ([510.0, height], 90.0, 0.0)];
+        let end = ended(&scene(&axons, 2.0, 0.02, blocks), &roster());
+        let found = cones(end.world());
+        found[1].position.x - found[0].position.x
+    };
+    assert!((parted(200.0) - 20.0).abs() < 1e-6, "{}", parted(200.0));
+    assert!(parted(820.0) > 22.0, "{}", parted(820.0));
+}
+
 /// Each mechanism with a strength of zero leaves the bits of a scene without it.
 #[test]
 fn a_mechanism_without_strength_changes_no_bit() {
@@ -126,6 +191,8 @@ fn a_mechanism_without_strength_changes_no_bit() {
         json!({ "bending_stiffness": { "weight": 0 } }),
         json!({ "durotaxis": { "weight": 0, "speed_exponent": 0, "profile": [[0, 100], [800, 2000]] } }),
         json!({ "steric_repulsion": { "weight": 0 } }),
+        json!({ "cone_release": { "cues": { "own": { "weight": 0 } } } }),
+        json!({ "cone_release": { "cues": { "own": { "release_rate": 0 } } } }),
         json!({ "leader_follower": { "regions": { "goal": disc }, "leader_speed": 1 } }),
         json!({ "retraction": { "prune_after": 100 } }),
         json!({ "zippering": { "adhesion": 0 } }),
@@ -150,6 +217,55 @@ fn a_bound_cue_is_the_diffusing_one_at_rest_and_another_one_in_a_stretched_tissu
     };
     assert_eq!(state("bound", 0.0), state("diffusing", 0.0));
     assert_ne!(state("bound", 0.1), state("diffusing", 0.1));
+}
+
+/// From the stationary field on, in a tissue at rest, nothing changes; from nothing on, a cone does not know of the source at first.
+#[test]
+fn a_transient_cue_that_starts_stationary_steers_as_the_diffusing_one_and_one_that_starts_from_nothing_later() {
+    let disc = json!({ "disc": { "centre": [700, 500], "radius": 80 } });
+    let at = |cue: Value| {
+        let mut netrin = json!({ "diffusion": "1 um^2/s", "degradation": "0.2 /h", "sources": [disc] });
+        cue.as_object().unwrap().iter().for_each(|(key, value)| netrin[key] = value.clone());
+        let blocks = json!({ "cues": { "netrin": netrin }, "chemotaxis": { "receptors": { "netrin": {} } } });
+        let end = ended(&scene(&[([400.0, 300.0], 90.0, 0.0)], 8.0, 0.1, blocks), &roster());
+        cones(end.world())[0].position
+    };
+    let diffusing = at(json!({}));
+    let still = at(json!({ "transport": "transient", "start": "stationary" }));
+    assert!((still - diffusing).norm() < 1e-7, "{}", (still - diffusing).norm());
+    let risen = at(json!({ "transport": "transient" }));
+    let later = at(json!({ "transport": "transient", "release_from": 4 }));
+    let ended = at(json!({ "transport": "transient", "release_until": 2 }));
+    assert!(diffusing.x > risen.x + 5.0 && risen.x > later.x + 5.0 && risen.x > ended.x, "{risen} {later} {ended}");
+}
+
+/// Mean way to the right of the axons born first and of those born last, of which the cue has reached the latter only.
+#[test]
+fn axons_born_before_a_front_arrives_pass_and_later_ones_turn() {
+    let ways = |name: &str| {
+        let path = format!("{}/scenarios/{name}.json", env!("CARGO_MANIFEST_DIR")).into();
+        let scene = read(&Request { path, without: vec![], set: vec![] }, &tropism::systems::standard()).unwrap();
+        let mut simulation = Simulation::assemble(&scene, &tropism::systems::standard()).unwrap();
+        let origins: Vec<f64> = {
+            let (world, tissue) = (simulation.world(), simulation.world().resource::<Tissue>());
+            let mut query = world.try_query::<&Origin>().unwrap();
+            query.iter(world).map(|origin| tissue.reference_position(origin.site).x).collect()
+        };
+        to_end(&mut simulation);
+        let mut ways: Vec<(f64, f64)> = cones(simulation.world())
+            .iter()
+            .zip(origins)
+            .map(|(cone, origin)| (cone.identity.birth_time, cone.position.x - origin))
+            .collect();
+        ways.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let mean = |part: &[(f64, f64)]| part.iter().map(|(_, way)| way).sum::<f64>() / part.len() as f64;
+        [mean(&ways[..ways.len() / 4]), mean(&ways[3 * ways.len() / 4..])]
+    };
+    let ([early, late], [stationary_early, stationary_late]) = (ways("cue_front"), ways("cue_front_stationary"));
+    println!(
+        "um to the right, first and last quarter: {early:.0} {late:.0}; stationary {stationary_early:.0} {stationary_late:.0}"
+    );
+    assert!(late > early + 50.0 && (stationary_late - stationary_early).abs() < 0.5 * (late - early));
 }
 
 /// A measure of a scenario of the repository over its first seeds, with some keys set and mechanisms left out.
@@ -193,6 +309,21 @@ fn axons_that_adhere_to_their_kind_sort_themselves() {
 }
 
 #[test]
+fn cones_bundle_by_what_they_release_and_part_again_where_the_target_switches_a_repellent_on() {
+    let size = |height: usize, set: &[&str]| {
+        let pointer = format!("/morphology/heights/{height}/fascicles/mean_size_per_axon");
+        measured("released_cues", &[], set, at(&pointer))
+    };
+    let (no_attractant, no_repellent) = ("/cone_release/cues/bundling=null", "/cone_release/cues/debundling=null");
+    let (half_way, alone) = (size(1, &[]), size(1, &[no_attractant]));
+    let (near_target, still_bundled) = (size(2, &[]), size(2, &[no_repellent]));
+    println!(
+        "axons a fascicle: half-way {half_way:.1}, {alone:.1} without the attractant; near the target {near_target:.1}, {still_bundled:.1} without the repellent"
+    );
+    assert!(half_way > 1.5 * alone && still_bundled > 2.5 * near_target);
+}
+
+#[test]
 fn the_scenario_of_each_mechanism_shows_its_effect() {
     let straightness = "/morphology/straightness/mean";
     let spread = "/morphology/heights/2/spread_um";
@@ -212,9 +343,27 @@ fn the_scenario_of_each_mechanism_shows_its_effect() {
 
 #[test]
 fn what_makes_no_sense_is_refused_with_its_place() {
+    let cue = |keys: Value| {
+        let mut netrin = json!({ "sources": [{ "disc": { "centre": [500, 700], "radius": 80 } }] });
+        keys.as_object().unwrap().iter().for_each(|(key, value)| netrin[key] = value.clone());
+        json!({ "cues": { "netrin": netrin } })
+    };
     for (block, expected) in [
         (json!({ "growth_rate_modulation": { "cue": "netrin" } }), "/growth_rate_modulation/cue: there is no cue"),
         (json!({ "durotaxis": {} }), "/durotaxis/profile: give pairs"),
+        (json!({ "cone_release": {} }), "/cone_release/cues: name what cones release"),
+        (
+            json!({ "cone_release": { "cues": { "own": { "activated_by": { "cue": "netrin" } } } } }),
+            "/cone_release/cues/own/activated_by/cue: there is no cue",
+        ),
+        (cue(json!({ "start": "nothing" })), "/cues/netrin/start: only a transient cue"),
+        (cue(json!({ "release_until": 1 })), "/cues/netrin/release_until: only a transient cue"),
+        (cue(json!({ "transport": "transient", "element": "quadratic" })), "/cues/netrin/element: a transient cue"),
+        (cue(json!({ "transport": "transient", "mass": "consistent" })), "/cues/netrin/mass: a transient cue"),
+        (
+            cue(json!({ "transport": "transient", "release_from": 3, "release_until": 3 })),
+            "/cues/netrin/release_until: 3 h is not after 3 h",
+        ),
         (json!({ "durotaxis": { "profile": [[1, 5], [0, 5]] } }), "/durotaxis/profile: places must ascend"),
         (json!({ "durotaxis": { "profile": [[1, -5]] } }), "/durotaxis/profile: a stiffness is positive"),
         (json!({ "leader_follower": {} }), "/leader_follower/regions: give a region"),

@@ -8,4 +8,5 @@ mod gradient_recovery;
 mod load_path;
 mod quadratic_field;
 mod reaction_diffusion;
+mod transient_field;
 mod turning;

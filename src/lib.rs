@@ -11,25 +11,57 @@
 //! - `study`: runs of runs.
 //!
 //! An author of a mechanism needs the [`prelude`], [`standard`] and [`run`], and nothing else: they are what the crate promises.
-//! The rooms are open for its own tests and benches only; their names and contents may change with any version.
+//! The rooms are private; the feature `rooms` opens them to the crate's own tests and benches.
+
+#![cfg_attr(not(feature = "rooms"), allow(dead_code, unused_imports))] // what only tests, benches and authors name
+#![allow(rustdoc::private_intra_doc_links)]
 
 extern crate self as tropism;
 
 mod cli;
+mod new_mechanism;
+pub mod prelude;
+
+#[cfg(not(feature = "rooms"))]
+mod model;
+#[cfg(feature = "rooms")]
 #[doc(hidden)]
 pub mod model;
-mod new_mechanism;
+
+#[cfg(not(feature = "rooms"))]
+mod numerics;
+#[cfg(feature = "rooms")]
 #[doc(hidden)]
 pub mod numerics;
-pub mod prelude;
+
+#[cfg(not(feature = "rooms"))]
+mod record;
+#[cfg(feature = "rooms")]
 #[doc(hidden)]
 pub mod record;
+
+#[cfg(not(feature = "rooms"))]
+mod scenario;
+#[cfg(feature = "rooms")]
 #[doc(hidden)]
 pub mod scenario;
+
+#[cfg(not(feature = "rooms"))]
+mod simulation;
+#[cfg(feature = "rooms")]
 #[doc(hidden)]
 pub mod simulation;
+
+#[cfg(not(feature = "rooms"))]
+mod study;
+#[cfg(feature = "rooms")]
 #[doc(hidden)]
 pub mod study;
+
+#[cfg(not(feature = "rooms"))]
+#[path = "../systems/mod.rs"]
+mod systems;
+#[cfg(feature = "rooms")]
 #[doc(hidden)]
 #[path = "../systems/mod.rs"]
 pub mod systems;

@@ -3,5 +3,5 @@
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    tropism::run(std::env::args_os(), tropism::systems::standard())
+    tropism::run(std::env::args_os(), tropism::standard())
 }

@@ -27,6 +27,9 @@ pub use crate::model::quantity::{
     ElongationalViscosity, Factor, Force, Gradient, Kind, Length, Pressure, Quantity, Rate, ReleaseRate, Speed,
     StiffnessGradient, Time,
 };
+// What `quantity!` writes names these.
+#[doc(hidden)]
+pub use crate::model::quantity::{deserialize_quantity, quantity_schema, serialize_quantity};
 pub use crate::model::random::{KeyedRng, Stream};
 pub use crate::model::remodel::{Place, Remodelling, Standing};
 pub use crate::model::schedule::{Phase, Term};

@@ -37,7 +37,7 @@ macro_rules! quantity {
 
         impl $crate::prelude::serde::Serialize for $name {
             fn serialize<S: $crate::prelude::serde::Serializer>(&self, serializer: S) -> ::core::result::Result<S::Ok, S::Error> {
-                $crate::model::quantity::serialize_quantity(self.0, serializer)
+                $crate::prelude::serialize_quantity(self.0, serializer)
             }
         }
 
@@ -45,7 +45,7 @@ macro_rules! quantity {
             fn deserialize<D: $crate::prelude::serde::Deserializer<'de>>(
                 deserializer: D,
             ) -> ::core::result::Result<Self, D::Error> {
-                $crate::model::quantity::deserialize_quantity(deserializer)
+                $crate::prelude::deserialize_quantity(deserializer)
             }
         }
 
@@ -63,7 +63,7 @@ macro_rules! quantity {
             }
 
             fn json_schema(_: &mut $crate::prelude::schemars::SchemaGenerator) -> $crate::prelude::schemars::Schema {
-                $crate::model::quantity::quantity_schema(<Self as $crate::prelude::Quantity>::KIND)
+                $crate::prelude::quantity_schema(<Self as $crate::prelude::Quantity>::KIND)
             }
         }
     };

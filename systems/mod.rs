@@ -9,13 +9,14 @@ pub mod fasciculation;
 pub mod growth_rate_modulation;
 pub mod heading_noise;
 pub mod leader_follower;
+pub mod materials;
 pub mod matrix;
 pub mod shaft_index;
 pub mod steric_repulsion;
 
 use crate::model::mechanism::Roster;
 
-/// All mechanisms that come with the program: providers first, then terms in the order in which they are summed.
+/// All mechanisms that come with the program: providers first, then terms in the order in which they are summed; and its laws of material.
 pub fn standard() -> Roster {
     Roster::new()
         .with::<matrix::Matrix>()
@@ -29,4 +30,7 @@ pub fn standard() -> Roster {
         .with::<durotaxis::Durotaxis>()
         .with::<bending_stiffness::BendingStiffness>()
         .with::<heading_noise::HeadingNoise>()
+        .with_material::<materials::StVenantKirchhoffLaw>()
+        .with_material::<materials::NeoHookeanLaw>()
+        .with_material::<materials::OgdenLaw>()
 }

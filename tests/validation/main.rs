@@ -9,4 +9,5 @@ mod fixed_pull;
 mod mechanisms;
 mod noise;
 mod tissue;
+mod tissue_growth;
 mod turning;

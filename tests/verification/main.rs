@@ -6,6 +6,8 @@ mod equilibria;
 mod figures;
 mod gradient_recovery;
 mod load_path;
+mod materials;
 mod quadratic_field;
 mod reaction_diffusion;
+mod tissue_growth;
 mod turning;

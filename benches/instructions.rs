@@ -1,9 +1,9 @@
-//! What a mechanism costs, in instructions: `cargo bench --bench instructions` (needs valgrind; about a minute).
+//! What a mechanism costs, in instructions: `cargo bench --bench instructions` (needs valgrind; about a minute and a half).
 //!
-//! The program runs itself under cachegrind for N and for 2N steps of a small scene, on one thread; the difference is that of N steps and
-//! holds nothing of what happens before the first. Twice so: with the roster that comes with the program, and with one that has the scene's
-//! mechanisms only. Off is absence, so both must agree: within 0.1 %, or the program ends with 1. Then a table: one mechanism after the
-//! other joins the scene.
+//! The program runs itself under callgrind, which counts the instructions of N steps of a small scene after N others, on one thread, and
+//! nothing of what happens before. Twice so: with the roster that comes with the program, and with one that has the scene's mechanisms
+//! only. Off is absence, so both must agree: within 0.1 %, or the program ends with 1. Then a table: one mechanism after the other joins
+//! the scene.
 
 use serde_json::{Value, json};
 use std::process::{Command, ExitCode};
@@ -12,7 +12,7 @@ use tropism::simulation::Simulation;
 use tropism::study::run::read_document;
 use tropism::systems;
 
-/// Steps of the shorter run.
+/// Steps before the count, and steps that are counted.
 const STEPS: usize = 30;
 /// Largest difference of the two rosters, as a share.
 const ALLOWED: f64 = 1e-3;
@@ -79,45 +79,49 @@ fn roster(whole: bool, number: usize) -> Roster {
     })
 }
 
-/// One run: `whole` or `own`, the number of the scene, the number of steps.
+/// One run: `whole` or `own`, and the number of the scene.
 fn watched(arguments: &[String]) -> ExitCode {
-    let number = |place: usize| arguments[place].parse::<usize>().expect("a number");
-    let roster = roster(arguments[0] == "whole", number(1));
+    let number = arguments[1].parse::<usize>().expect("a number");
+    let roster = roster(arguments[0] == "whole", number);
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a thread");
     let cone_steps = pool.install(|| {
-        let loaded = read_document("scene", scene(number(1)), &roster).unwrap_or_else(|error| panic!("{error}"));
+        let loaded = read_document("scene", scene(number), &roster).unwrap_or_else(|error| panic!("{error}"));
         let mut simulation = Simulation::assemble(&loaded, &roster).unwrap_or_else(|error| panic!("{error}"));
-        (0..number(2)).for_each(|_| simulation.step().unwrap_or_else(|fault| panic!("{fault}")));
-        simulation.counters().cone_steps
+        take_steps(&mut simulation);
+        let before = simulation.counters().cone_steps;
+        counted_steps(&mut simulation);
+        simulation.counters().cone_steps - before
     });
     println!("cone-steps {cone_steps}");
     ExitCode::SUCCESS
 }
 
-/// Instructions and cone-steps of one run.
-fn count(kind: &str, number: usize, steps: usize) -> Result<[f64; 2], String> {
-    let own = std::env::current_exe().map_err(|error| error.to_string())?;
-    let output = Command::new("valgrind")
-        .args(["--tool=cachegrind", "--cache-sim=no", "--cachegrind-out-file=/dev/null"])
-        .arg(own)
-        .args([CHILD, kind, &number.to_string(), &steps.to_string()])
-        .output()
-        .map_err(|error| {
-            format!("valgrind could not be started ({error}); it counts the instructions, so install it first")
-        })?;
-    let [said, counted] = [&output.stdout, &output.stderr].map(|text| String::from_utf8_lossy(text).into_owned());
-    let digits = |text: &str| text.chars().filter(char::is_ascii_digit).collect::<String>().parse::<f64>().ok();
-    let after = |text: &str, word: &str| text.lines().find_map(|line| digits(line.split_once(word)?.1));
-    match (after(&counted, "I refs:").or_else(|| after(&counted, "I   refs:")), after(&said, "cone-steps")) {
-        (Some(instructions), Some(cone_steps)) => Ok([instructions, cone_steps]),
-        _ => Err(format!("a run of scene {number} ended without its counts:\n{said}{counted}")),
-    }
+fn take_steps(simulation: &mut Simulation) {
+    (0..STEPS).for_each(|_| simulation.step().unwrap_or_else(|fault| panic!("{fault}")));
+}
+
+/// The steps that callgrind counts: it knows them by the name of this function.
+#[inline(never)]
+fn counted_steps(simulation: &mut Simulation) {
+    take_steps(simulation);
 }
 
 /// Instructions a cone-step of scene `number`.
 fn per_cone_step(kind: &str, number: usize) -> Result<f64, String> {
-    let (short, long) = (count(kind, number, STEPS)?, count(kind, number, 2 * STEPS)?);
-    Ok((long[0] - short[0]) / (long[1] - short[1]))
+    let own = std::env::current_exe().map_err(|error| error.to_string())?;
+    let output = Command::new("valgrind")
+        .args(["--tool=callgrind", "--toggle-collect=*counted_steps*", "--callgrind-out-file=/dev/null"])
+        .arg(own)
+        .args([CHILD, kind, &number.to_string()])
+        .output()
+        .map_err(|error| format!("valgrind, which counts the instructions, could not be started: {error}"))?;
+    let [said, counted] = [&output.stdout, &output.stderr].map(|text| String::from_utf8_lossy(text).into_owned());
+    let after =
+        |text: &str, word: &str| text.lines().find_map(|line| line.split_once(word)?.1.trim().parse::<f64>().ok());
+    match (after(&counted, "Collected :"), after(&said, "cone-steps")) {
+        (Some(instructions), Some(cone_steps)) if instructions > 0.0 => Ok(instructions / cone_steps),
+        _ => Err(format!("a run of scene {number} ended without its counts:\n{said}{counted}")),
+    }
 }
 
 fn compare() -> ExitCode {
@@ -132,21 +136,23 @@ fn compare() -> ExitCode {
 
 /// Prints both tables; whether absent mechanisms cost nothing.
 fn report() -> Result<bool, String> {
-    println!("instructions a cone-step; 40 cones, steps {STEPS} to {}, one thread", 2 * STEPS);
-    println!("{:<32} {:>12} {:>12} {:>10}", "mechanisms of the scene", "own roster", "whole roster", "difference");
+    println!("instructions a cone-step; 40 cones, {STEPS} steps after {STEPS}, one thread");
+    println!("{:>12} {:>12} {:>10}   mechanisms of the scene", "own roster", "whole roster", "difference");
     let mut equal = true;
     for number in [0, 2, 6] {
         let (own, whole) = (per_cone_step("own", number)?, per_cone_step("whole", number)?);
         let difference = whole / own - 1.0;
         equal &= difference.abs() <= ALLOWED;
-        println!("{:<32} {own:>12.0} {whole:>12.0} {:>9.4}%", format!("the first {number}"), 100.0 * difference);
+        let names: Vec<&str> = blocks().into_iter().take(number).map(|(name, _)| name).collect();
+        let names = if names.is_empty() { "none".to_owned() } else { names.join(", ") };
+        println!("{own:>12.1} {whole:>12.1} {:>+9.4}%   {names}", 100.0 * difference);
     }
-    println!("\n{:<32} {:>12} {:>12}", "one more mechanism", "in all", "more");
+    println!("\n{:>12} {:>12}   one more mechanism", "in all", "more");
     let mut before = per_cone_step("whole", 0)?;
-    println!("{:<32} {before:>12.0}", "none");
+    println!("{before:>12.1} {:>12}   none", "");
     for (place, (name, _)) in blocks().iter().enumerate() {
         let now = per_cone_step("whole", place + 1)?;
-        println!("{name:<32} {now:>12.0} {:>+12.0}", now - before);
+        println!("{now:>12.1} {:>+12.1}   {name}", now - before);
         before = now;
     }
     if !equal {

@@ -87,6 +87,13 @@ keys! {
 /// Bytes an unknown that solving takes: tangent, factor and what belongs to them. Ours, measured.
 const WORKSPACE: f64 = 2000.0;
 
+impl EdgeMotion {
+    /// Whether the edge leaves its place.
+    fn acts(&self) -> bool {
+        self.outward.0 != 0.0 || self.shift.iter().any(|shift| shift.0 != 0.0)
+    }
+}
+
 impl LoadCurve {
     /// The largest load that is reached.
     fn largest(&self) -> f64 {
@@ -106,16 +113,17 @@ impl Matrix {
 
     /// Whether any edge moves or anything grows at any time.
     fn moves(&self) -> bool {
-        let moved = |motion: &EdgeMotion| motion.outward.0 != 0.0 || motion.shift.iter().any(|shift| shift.0 != 0.0);
         let LoadCurve { times, loads } = &self.load;
         let loaded = times.is_empty() || loads.iter().any(|load| load.0 != 0.0);
-        loaded && (self.edges().values().any(moved) || self.growth.as_ref().is_some_and(TissueGrowth::acts))
+        loaded && (self.edges().values().any(EdgeMotion::acts) || self.growth.as_ref().is_some_and(TissueGrowth::acts))
     }
 
     /// What deforms the tissue, in words.
     fn causes(&self) -> String {
-        let edges: Vec<String> = self.edges().into_keys().collect();
-        let moved = (!edges.is_empty()).then(|| format!("edges {} are moved", edges.join(", ")));
+        let edges = self.edges();
+        let what = if edges.values().any(EdgeMotion::acts) { "moved" } else { "held" };
+        let names = edges.keys().map(String::as_str).collect::<Vec<_>>().join(", ");
+        let moved = (!edges.is_empty()).then(|| format!("edges {names} are {what}"));
         let grown = self.growth.as_ref().filter(|growth| growth.acts()).map(|growth| match growth.extremes() {
             [low, high] if low == high => format!("the tissue grows to {high} times its length"),
             [low, high] => format!("the tissue grows to {low} to {high} times its length"),

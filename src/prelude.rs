@@ -20,6 +20,7 @@ pub use crate::model::components::{
 pub use crate::model::cones::{Cone, Cones, ConesWith};
 pub use crate::model::growth::{Growth, Population, Populations, ShaftPopulations, Targets};
 pub use crate::model::health::{Counters, Health};
+pub use crate::model::material_law::{MaterialChoice, MaterialLaw, Materials};
 pub use crate::model::mechanism::{Demands, Facts, InstallError, Law, Mechanism, ModelBuilder, Roster, unknown_name};
 pub use crate::model::plan::{Each, Plan, Work};
 pub use crate::model::quantity::{
@@ -38,5 +39,7 @@ pub use crate::model::shape::{Point, Shape};
 pub use crate::model::shelf::Shelf;
 pub use crate::model::tissue::{Configuration, Tissue};
 pub use crate::model::violation::{Violation, Violations};
+pub use crate::numerics::law_check::{LawDefects, law_defects};
+pub use crate::numerics::material::{Lame, Material, Tensor};
 pub use crate::systems::cue_fields::{CueFields, CueSample};
 pub use crate::{keys, quantity};

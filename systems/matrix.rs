@@ -4,28 +4,21 @@
 //! depends on one load s(t) ∈ [0, 1] alone, so a few load levels are solved before the run and interpolated by cubic Hermite
 //! polynomials; v_φ = ṡ times the derivative of that interpolant. The paper moves top and bottom by "about 20 % of the initial
 //! vertical dimension for each side"; ours: outward, held sideways, linear in time, material numbers.
+//! Ours too: the tissue may grow by itself, F = F_e F_g with F_g = g I, the mass source that the paper leaves out.
+
+mod growth;
+
+pub use growth::{GrowingRegion, TissueGrowth};
 
 use crate::numerics::ellipticity::ellipticity_left;
+use crate::numerics::grown::Growth;
 use crate::numerics::hermite::Interpolation as Course;
 use crate::numerics::hyperelasticity::{Body, Prescribed};
 use crate::numerics::load_path::{LoadPath, LoadPathOptions};
-use crate::numerics::material::{Lame, Material, NeoHookean, StVenantKirchhoff};
-use crate::numerics::ogden::Ogden;
+use crate::numerics::material::MaterialError;
 use crate::prelude::*;
 use std::collections::BTreeMap;
 use std::sync::Arc;
-
-/// The law of the matrix.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum MaterialLaw {
-    /// St. Venant–Kirchhoff, as in the paper; soft in compression, where it fails.
-    StVenantKirchhoff,
-    /// Neo-Hookean, ours: stays well-posed in compression.
-    NeoHookean,
-    /// Ogden with one term, ours: stiffens or softens as `ogden_exponent` says; neo-Hookean with an exponent of 2.
-    Ogden,
-}
 
 /// What an edge does sideways while it moves.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -69,19 +62,18 @@ keys! {
 
     /// The deforming matrix (eq. 3): hyperelastic, moved at named edges; −∇·P = 0, U = Û on Γ_D.
     pub struct Matrix {
-        /// The material.
-        pub material: MaterialLaw = MaterialLaw::StVenantKirchhoff,
-        /// Exponent α of the principal stretches, with `ogden` only. Brain tissue: −20 to −5. Absent: 8. Ours.
-        #[schemars(extend("x-typical" = [-20.0, 20.0]))]
-        pub ogden_exponent: Option<Factor> = None,
+        /// The law of the material: its name, or its name with keys of its own.
+        pub material: MaterialChoice = MaterialChoice::of("st_venant_kirchhoff"),
         /// Young's modulus E. It drops out of displacements when only motion is imposed. Source: embryonic mesoderm.
         #[schemars(extend("exclusiveMinimum" = 0.0, "x-typical" = [100.0, 3000.0]))]
         pub young_modulus: Pressure = Pressure(500.0),
         /// Poisson's ratio ν.
         #[schemars(extend("minimum" = 0.0, "exclusiveMaximum" = 0.5, "x-typical" = [0.2, 0.45]))]
         pub poisson_ratio: Factor = Factor(0.3),
-        /// The edges that move, by name; edges not named are free. Empty: top and bottom, outward by 20 %, held.
+        /// The edges that move, by name; edges not named are free. Empty: top and bottom, outward by 20 %, held; none if it grows.
         pub motion: BTreeMap<String, EdgeMotion> = BTreeMap::new(),
+        /// Growth of the tissue by itself, with the load. Ours. Absent: none.
+        pub growth: Option<TissueGrowth> = None,
         /// The load over time. Ours: linear over the whole run.
         pub load: LoadCurve = LoadCurve::default(),
         /// Largest error of the interpolated displacement between load levels, over the tissue's size. Ours.
@@ -95,6 +87,13 @@ keys! {
 /// Bytes an unknown that solving takes: tangent, factor and what belongs to them. Ours, measured.
 const WORKSPACE: f64 = 2000.0;
 
+impl EdgeMotion {
+    /// Whether the edge leaves its place.
+    fn acts(&self) -> bool {
+        self.outward.0 != 0.0 || self.shift.iter().any(|shift| shift.0 != 0.0)
+    }
+}
+
 impl LoadCurve {
     /// The largest load that is reached.
     fn largest(&self) -> f64 {
@@ -103,34 +102,50 @@ impl LoadCurve {
 }
 
 impl Matrix {
-    /// The motion with its default filled in: top and bottom outward by 20 % each [paper], held sideways.
+    /// The motion with its default filled in: top and bottom outward by 20 % each [paper], held sideways; none if the tissue grows.
     fn edges(&self) -> BTreeMap<String, EdgeMotion> {
-        if !self.motion.is_empty() {
+        if !self.motion.is_empty() || self.growth.is_some() {
             return self.motion.clone();
         }
         let outward = EdgeMotion { outward: Factor(0.2), ..EdgeMotion::default() };
         ["top", "bottom"].map(|name| (name.to_owned(), outward.clone())).into()
     }
 
-    /// Whether any edge moves at any time.
+    /// Whether any edge moves or anything grows at any time.
     fn moves(&self) -> bool {
-        let moved = |motion: &EdgeMotion| motion.outward.0 != 0.0 || motion.shift.iter().any(|shift| shift.0 != 0.0);
         let LoadCurve { times, loads } = &self.load;
         let loaded = times.is_empty() || loads.iter().any(|load| load.0 != 0.0);
-        loaded && self.edges().values().any(moved)
+        loaded && (self.edges().values().any(EdgeMotion::acts) || self.growth.as_ref().is_some_and(TissueGrowth::acts))
     }
 
-    fn law(&self) -> Result<Arc<dyn Material<2>>, InstallError> {
-        let lame = Lame::from_young_poisson(self.young_modulus.0, self.poisson_ratio.0).map_err(solve_error)?;
-        Ok(match self.material {
-            MaterialLaw::StVenantKirchhoff => Arc::new(StVenantKirchhoff { lame }),
-            MaterialLaw::NeoHookean => Arc::new(NeoHookean { lame }),
-            MaterialLaw::Ogden => Arc::new(Ogden { lame, exponent: self.ogden_exponent.map_or(8.0, |alpha| alpha.0) }),
+    /// What deforms the tissue, in words.
+    fn causes(&self) -> String {
+        let edges = self.edges();
+        let what = if edges.values().any(EdgeMotion::acts) { "moved" } else { "held" };
+        let names = edges.keys().map(String::as_str).collect::<Vec<_>>().join(", ");
+        let moved = (!edges.is_empty()).then(|| format!("edges {names} are {what}"));
+        let grown = self.growth.as_ref().filter(|growth| growth.acts()).map(|growth| match growth.extremes() {
+            [low, high] if low == high => format!("the tissue grows to {high} times its length"),
+            [low, high] => format!("the tissue grows to {low} to {high} times its length"),
+        });
+        moved.into_iter().chain(grown).collect::<Vec<_>>().join(", ")
+    }
+
+    fn lame(&self) -> Result<Lame, MaterialError> {
+        Lame::from_young_poisson(self.young_modulus.0, self.poisson_ratio.0)
+    }
+
+    fn law(&self, materials: &Materials) -> Result<Arc<dyn Material<2>>, InstallError> {
+        let found = materials.material(&self.material, self.lame().map_err(solve_error)?);
+        found.map_err(|wrong| match wrong.into_iter().next() {
+            Some(first) => InstallError::Scenario(first.under("/material")),
+            None => solve_error("the material was refused"),
         })
     }
 
-    /// Vertices and amplitudes of the imposed motion. A body that could still slide sideways is held at one vertex.
-    fn prescribed(&self, tissue: &Tissue) -> Result<Prescribed<2>, InstallError> {
+    /// Vertices and amplitudes of the imposed motion. A body that could still slide sideways is held at one vertex, one that grows with
+    /// no edge held at its middle: supports that carry no force.
+    fn prescribed(&self, tissue: &Tissue, growth: &Growth) -> Result<Prescribed<2>, InstallError> {
         let mesh = &tissue.mesh;
         let mut prescribed = Prescribed::none(mesh.vertex_count());
         let mut imposed = [false; 2];
@@ -151,17 +166,20 @@ impl Matrix {
                 }
             }
         }
-        for k in (0..2).filter(|k| !imposed[*k]) {
-            if let Some(vertex) = first_vertex {
-                prescribed.impose(vertex, k, 0.0);
+        match first_vertex {
+            Some(vertex) => {
+                (0..2).filter(|k| !imposed[*k]).for_each(|k| prescribed.impose(vertex, k, 0.0));
             }
+            None => hold_the_middle(mesh.vertices(), growth, &mut prescribed),
         }
         Ok(prescribed)
     }
 
-    fn solve(&self, tissue: &Tissue) -> Result<Equilibria, InstallError> {
-        let prescribed = self.prescribed(tissue)?;
-        let body = Body::new(&tissue.mesh, self.law()?, prescribed).map_err(solve_error)?;
+    fn solve(&self, tissue: &Tissue, law: Arc<dyn Material<2>>) -> Result<Equilibria, InstallError> {
+        let growth = self.growth.as_ref().map(|growth| growth.of_cells(tissue)).unwrap_or_default();
+        let prescribed = self.prescribed(tissue, &growth)?;
+        let body =
+            Body::new(&tissue.mesh, law, prescribed).and_then(|body| body.growing(growth)).map_err(solve_error)?;
         let interpolation = match self.interpolation {
             Interpolation::Cubic => Course::Cubic,
             Interpolation::Linear => Course::Linear,
@@ -171,8 +189,9 @@ impl Matrix {
             InstallError::Solve(format!("the matrix (eq. 3) has no path to its full load: {error}{}", remedy(self)))
         })?;
         let mut farthest = vec![0.0; body.unknowns()];
-        path.displacement(self.load.largest(), &mut farthest);
-        let used = 1.0 - ellipticity_left(&body, &farthest);
+        let largest = self.load.largest();
+        path.displacement(largest, &mut farthest);
+        let used = 1.0 - ellipticity_left(&body, largest, &farthest);
         Ok(Equilibria { path, used })
     }
 }
@@ -185,10 +204,11 @@ impl Mechanism for Matrix {
         for name in self.edges().keys().filter(|name| !facts.edges.contains(name)) {
             wrong.push("/motion", unknown_name("edge", name, &facts.edges));
         }
-        let only_ogden = self.ogden_exponent.is_none() || self.material == MaterialLaw::Ogden;
-        wrong.demand(only_ogden, "/ogden_exponent", || "only the material `ogden` has an exponent".into());
-        let zero = self.ogden_exponent.is_some_and(|alpha| alpha.0 == 0.0);
-        wrong.demand(!zero, "/ogden_exponent", || "an exponent of zero has no energy; 2 is neo-Hookean".into());
+        if let Ok(lame) = self.lame()
+            && let Err(refused) = facts.materials.material(&self.material, lame)
+        {
+            wrong.extend_under("/material", refused);
+        }
         let LoadCurve { times, loads } = &self.load;
         wrong.demand(times.len() == loads.len() && times.len() != 1, "/load", || {
             format!("{} times and {} loads: give as many loads as times, two or more", times.len(), loads.len())
@@ -200,23 +220,27 @@ impl Mechanism for Matrix {
         wrong
     }
 
+    fn outlines(&self) -> Vec<(String, Shape)> {
+        self.growth.as_ref().map(TissueGrowth::outlines).unwrap_or_default()
+    }
+
     fn install(self, model: &mut ModelBuilder) -> Result<(), InstallError> {
         if !self.moves() {
-            model.plan().leave_out("matrix", "no edge moves: the tissue stays at rest");
+            model.plan().leave_out("matrix", "no edge moves and nothing grows: the tissue stays at rest");
             return Ok(());
         }
+        let law = self.law(model.world.resource::<Materials>())?;
         let tissue = model.world.resource::<Tissue>();
         let inputs = format!("{} {self:?}", tissue.inputs);
-        let (equilibria, new) = model.world.resource::<Shelf>().take(&inputs, || self.solve(tissue))?;
+        let (equilibria, new) = model.world.resource::<Shelf>().take(&inputs, || self.solve(tissue, law))?;
         let Equilibria { path, used } = &*equilibria;
         let duration = model.world.resource::<Clock>().grid.hours(model.world.resource::<Clock>().end);
         record(model.world, path, new);
         tell_kinks(model.world, &self.load);
-        let edges: Vec<String> = self.edges().into_keys().collect();
         let (unknowns, report) = (2 * model.world.resource::<Tissue>().mesh.vertex_count(), path.report());
         let why = format!(
-            "edges {} are moved: {unknowns} unknowns, {} load levels, {} equilibria",
-            edges.join(", "),
+            "{}: {unknowns} unknowns, {} load levels, {} equilibria",
+            self.causes(),
             report.levels,
             report.solves
         );
@@ -275,13 +299,10 @@ fn remedy(matrix: &Matrix) -> &'static str {
     if matrix.poisson_ratio.0 > 0.49 {
         return ". A Poisson ratio this near 0.5 locks linear triangles; 0.45 or less is advised";
     }
-    match matrix.material {
-        MaterialLaw::StVenantKirchhoff => {
-            ". St. Venant-Kirchhoff fails in compression; `\"material\": \"neo_hookean\"` goes further, as does less motion"
-        }
-        MaterialLaw::NeoHookean | MaterialLaw::Ogden => {
-            ". Less motion, sliding instead of held edges, or a finer mesh may help"
-        }
+    if matrix.material == Matrix::default().material {
+        ". St. Venant-Kirchhoff fails in compression; `\"material\": \"neo_hookean\"` goes further, as does less motion"
+    } else {
+        ". Less motion, sliding instead of held edges, or a finer mesh may help"
     }
 }
 
@@ -295,6 +316,24 @@ fn refuse(edge: &str, message: &str) -> InstallError {
 
 fn no_such_edge(name: &str, tissue: &Tissue) -> InstallError {
     refuse(name, &unknown_name("edge", name, &tissue.domain.edge_names))
+}
+
+/// Holds the vertex nearest to the middle, and keeps the one farthest from it from turning about it: one component of it moves as it
+/// would if all cells grew by the mean factor.
+fn hold_the_middle(rest: &[[f64; 2]], growth: &Growth, prescribed: &mut Prescribed<2>) {
+    let mean = |k: usize| rest.iter().map(|x| x[k]).sum::<f64>() / rest.len() as f64;
+    let distance = |from: [f64; 2], v: usize| (rest[v][0] - from[0]).hypot(rest[v][1] - from[1]);
+    let middle = [mean(0), mean(1)];
+    let nearest = (0..rest.len()).min_by(|&a, &b| distance(middle, a).total_cmp(&distance(middle, b)));
+    let Some(nearest) = nearest else { return };
+    prescribed.impose_all(nearest, [0.0; 2]);
+    let held = rest[nearest];
+    let farthest = (0..rest.len()).max_by(|&a, &b| distance(held, a).total_cmp(&distance(held, b)));
+    if let Some(farthest) = farthest {
+        let arm = [rest[farthest][0] - held[0], rest[farthest][1] - held[1]];
+        let component = usize::from(arm[0].abs() >= arm[1].abs());
+        prescribed.impose(farthest, component, (growth.mean() - 1.0) * arm[component]);
+    }
 }
 
 /// Mean outward unit normal of an edge at rest, and the tissue's extent (µm) in that direction.

@@ -12,6 +12,7 @@ pub mod fasciculation;
 pub mod growth_rate_modulation;
 pub mod heading_noise;
 pub mod leader_follower;
+pub mod materials;
 pub mod matrix;
 pub mod retraction;
 pub mod shaft_index;
@@ -20,7 +21,7 @@ pub mod zippering;
 
 use crate::model::mechanism::Roster;
 
-/// All mechanisms that come with the program: providers first, then terms in the order in which they are summed.
+/// All mechanisms that come with the program: providers first, then terms in the order in which they are summed; and its laws of material.
 pub fn standard() -> Roster {
     Roster::new()
         .with::<matrix::Matrix>()
@@ -38,4 +39,7 @@ pub fn standard() -> Roster {
         .with::<retraction::Retraction>()
         .with::<branching::Branching>()
         .with::<zippering::Zippering>()
+        .with_material::<materials::StVenantKirchhoffLaw>()
+        .with_material::<materials::NeoHookeanLaw>()
+        .with_material::<materials::OgdenLaw>()
 }

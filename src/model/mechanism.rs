@@ -6,6 +6,7 @@
 
 use super::components::GrowthCone;
 use super::health::Health;
+use super::material_law::{MaterialLaw, Materials};
 use super::plan::Plan;
 use super::random::Stream;
 use super::schedule::{Motion, Phase, Schedules, Slot, Term};
@@ -83,6 +84,8 @@ pub struct Facts {
     pub blocks: serde_json::Map<String, Value>,
     /// Length of the run (h).
     pub duration: f64,
+    /// The laws of material the program has.
+    pub materials: Materials,
 }
 
 impl Facts {
@@ -292,10 +295,11 @@ pub(crate) struct Entry {
     pub(crate) read: Reader,
 }
 
-/// The mechanisms a program has, in order of summation. The roster is the only list of them.
+/// The mechanisms a program has, in order of summation, and its laws of material. The roster is the only list of them.
 #[derive(Clone, Default)]
 pub struct Roster {
     pub(crate) entries: Vec<Entry>,
+    materials: Materials,
 }
 
 impl Roster {
@@ -322,8 +326,26 @@ impl Roster {
         self
     }
 
+    /// Adds a law that `matrix.material` may name. One that has the name of an earlier one takes its place.
+    pub fn with_material<M: MaterialLaw>(mut self) -> Self {
+        self.materials.add::<M>();
+        self
+    }
+
     /// Names of the mechanisms, in order.
     pub fn names(&self) -> Vec<&'static str> {
         self.entries.iter().map(|entry| entry.name).collect()
+    }
+
+    /// The laws of material.
+    pub fn materials(&self) -> &Materials {
+        &self.materials
+    }
+
+    /// The schema of a mechanism's block, with the laws of material in it.
+    pub(crate) fn schema(&self, entry: &Entry) -> Value {
+        let mut schema = (entry.schema)();
+        self.materials.complete(&mut schema);
+        schema
     }
 }

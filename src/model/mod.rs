@@ -12,6 +12,7 @@ pub mod growth;
 pub mod health;
 pub mod integrator;
 pub mod keys;
+pub mod material_law;
 pub mod mechanism;
 mod movers;
 pub mod observables;

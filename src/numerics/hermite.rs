@@ -206,7 +206,7 @@ pub type ValueAndSlope = (Vec<f64>, Vec<f64>);
 pub fn refine<E: From<HermiteError>>(
     parameters: &[f64],
     mut evaluate: impl FnMut(f64, Option<&[f64]>) -> Result<ValueAndSlope, E>,
-    defect: impl FnMut(&[f64], &[f64]) -> f64,
+    mut defect: impl FnMut(&[f64], &[f64]) -> f64,
     goal: Refinement,
 ) -> Result<(HermitePath, RefinementReport), E> {
     let mut levels: Vec<Level> = Vec::with_capacity(parameters.len());
@@ -215,7 +215,7 @@ pub fn refine<E: From<HermiteError>>(
         let (value, slope) = evaluate(parameter, guess.as_deref())?;
         levels.push(Level { parameter, value, slope });
     }
-    refine_path(HermitePath::new(levels)?, evaluate, defect, goal)
+    refine_path(HermitePath::new(levels)?, evaluate, |_, interpolated, exact| defect(interpolated, exact), goal)
 }
 
 /// The tangent predictor: value plus slope times the way from a level.
@@ -226,7 +226,7 @@ pub fn tangent_guess(level: &Level, parameter: f64) -> Vec<f64> {
 
 /// Adds levels until the interpolant meets the tolerance at the middle of every interval.
 ///
-/// `evaluate(s, guess)` returns value and slope at `s`; the guess is the interpolant there. `defect(interpolated, exact)` says
+/// `evaluate(s, guess)` returns value and slope at `s`; the guess is the interpolant there. `defect(s, interpolated, exact)` says
 /// how far the two are. A middle that was evaluated becomes a level, met or not, so nothing is solved twice. The widest parts
 /// are checked first, so that a cap on the levels spreads them evenly; order and result are deterministic.
 ///
@@ -235,7 +235,7 @@ pub fn tangent_guess(level: &Level, parameter: f64) -> Vec<f64> {
 pub fn refine_path<E: From<HermiteError>>(
     path: HermitePath,
     mut evaluate: impl FnMut(f64, Option<&[f64]>) -> Result<ValueAndSlope, E>,
-    mut defect: impl FnMut(&[f64], &[f64]) -> f64,
+    mut defect: impl FnMut(f64, &[f64], &[f64]) -> f64,
     goal: Refinement,
 ) -> Result<(HermitePath, RefinementReport), E> {
     let HermitePath { mut levels, interpolation } = path;
@@ -256,7 +256,7 @@ pub fn refine_path<E: From<HermiteError>>(
         part.evaluate(middle, &mut guess);
         let (value, slope) = evaluate(middle, Some(&guess))?;
         report.solves += 1;
-        let found = defect(&guess, &value);
+        let found = defect(middle, &guess, &value);
         levels.insert(above, Level { parameter: middle, value, slope });
         if found <= goal.tolerance {
             report.worst_defect = report.worst_defect.max(found);

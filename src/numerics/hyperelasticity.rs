@@ -5,7 +5,8 @@
 //! F = I + Σ_a (U_a − U_0) ⊗ ∇λ_a,     W(U) = Σ_cells V w(F),     f = ∂W/∂U,   f_a = V P(F) ∇λ_a.
 //! ```
 //! Equilibrium is `f = 0` at the free unknowns; at the prescribed ones `f` is the reaction, the force that the clamp exerts on the
-//! body. The motion imposed is `U = s·amplitude` with one load `s` (proportional loading).
+//! body. The motion imposed is `U = s·amplitude` with one load `s` (proportional loading). A body may [grow](crate::numerics::grown)
+//! as the load does; energies and forces are then functions of displacement and load.
 //!
 //! Displacements and forces are flat, stride `D`: component `c` of vertex `v` at `v D + c`. In the plane energies and forces
 //! are per length of the third direction (Pa µm², Pa µm).
@@ -16,6 +17,7 @@ use std::sync::Arc;
 pub use crate::numerics::imposed_motion::Prescribed;
 
 use crate::numerics::dissection::nested_dissection;
+use crate::numerics::grown::{Grown, Growth};
 use crate::numerics::imposed_motion::largest_extent;
 use crate::numerics::material::{Material, Tensor, jacobian, principal_stretches};
 use crate::numerics::simplex_mesh::SimplexMesh;
@@ -55,6 +57,18 @@ pub enum BodyError {
         /// Number of prescribed unknowns.
         held: usize,
     },
+    /// A factor of growth is not positive and finite, or not one a cell.
+    #[error(
+        "{given} factors of growth for {cells} cells, the smallest {smallest}: one a cell belongs here, positive and finite"
+    )]
+    Growth {
+        /// Factors given.
+        given: usize,
+        /// Cells of the mesh.
+        cells: usize,
+        /// The smallest factor, NaN if one is not finite.
+        smallest: f64,
+    },
     /// The pattern of the tangent could not be set up.
     #[error(transparent)]
     Sparse(#[from] SparseError),
@@ -90,6 +104,7 @@ pub struct Body<'m, const D: usize> {
     mesh: &'m SimplexMesh<D>,
     material: Arc<dyn Material<D>>,
     prescribed: Prescribed<D>,
+    growth: Growth,
     gradients: Vec<[f64; D]>,
     volumes: Vec<f64>,
     rows: Vec<u32>,
@@ -129,7 +144,28 @@ impl<'m, const D: usize> Body<'m, D> {
         let volume: f64 = volumes.iter().sum();
         let strain_norm = (small_strain_stiffness(material.as_ref()) * volume).sqrt();
         let size = largest_extent(mesh.vertices());
-        Ok(Self { mesh, material, prescribed, gradients, volumes, rows, pattern, size, strain_norm })
+        let growth = Growth::default();
+        Ok(Self { mesh, material, prescribed, growth, gradients, volumes, rows, pattern, size, strain_norm })
+    }
+
+    /// The body, growing with the load.
+    ///
+    /// # Errors
+    /// Factors that are not one a cell, or not positive and finite.
+    pub fn growing(mut self, growth: Growth) -> Result<Self, BodyError> {
+        let (given, cells) = (growth.factors().len(), self.mesh.cell_count());
+        let unsound = growth.factors().iter().any(|factor| !factor.is_finite());
+        let smallest = if unsound { f64::NAN } else { growth.factors().iter().copied().fold(f64::INFINITY, f64::min) };
+        if given != 0 && (given != cells || smallest.is_nan() || smallest <= 0.0) {
+            return Err(BodyError::Growth { given, cells, smallest });
+        }
+        self.growth = growth;
+        Ok(self)
+    }
+
+    /// The law of a cell at a load: the material, after what has grown there.
+    pub fn law(&self, load: f64, cell: usize) -> Grown<'_, D> {
+        Grown { law: self.material.as_ref(), factor: self.growth.factor(load, cell) }
     }
 
     /// The mesh at rest.
@@ -195,8 +231,9 @@ impl<'m, const D: usize> Body<'m, D> {
     }
 
     /// Whether the material may be used in every cell: `det F > 0` everywhere, for the common laws.
-    pub fn admissible(&self, displacement: &[f64]) -> bool {
-        (0..self.mesh.cell_count()).all(|cell| self.material.admissible(&self.deformation_gradient(displacement, cell)))
+    pub fn admissible(&self, load: f64, displacement: &[f64]) -> bool {
+        let in_cell = |cell| self.law(load, cell).admissible(&self.deformation_gradient(displacement, cell));
+        (0..self.mesh.cell_count()).all(in_cell)
     }
 
     /// The smallest `det F` and its cell (the first of equals); `(+∞, 0)` for a mesh without cells, NaN counts as smallest.
@@ -225,22 +262,35 @@ impl<'m, const D: usize> Body<'m, D> {
     }
 
     /// Strain energy `W(U)` (Pa µm^D).
-    pub fn energy(&self, displacement: &[f64]) -> f64 {
-        let density = |cell| self.material.energy(&self.deformation_gradient(displacement, cell));
+    pub fn energy(&self, load: f64, displacement: &[f64]) -> f64 {
+        let density = |cell| self.law(load, cell).energy(&self.deformation_gradient(displacement, cell));
         self.in_each_cell(density).iter().zip(&self.volumes).map(|(density, volume)| volume * density).sum()
     }
 
     /// Internal forces `f = ∂W/∂U` (Pa µm^(D−1)) at all unknowns: zero at the free ones in equilibrium, the reaction (force of
     /// the clamp on the body) at the prescribed ones.
-    pub fn internal_forces(&self, displacement: &[f64]) -> Vec<f64> {
-        self.assemble_forces(|cell| self.material.stress(&self.deformation_gradient(displacement, cell)))
+    pub fn internal_forces(&self, load: f64, displacement: &[f64]) -> Vec<f64> {
+        self.assemble_forces(|cell| self.law(load, cell).stress(&self.deformation_gradient(displacement, cell)))
     }
 
     /// Increment of the internal forces for an increment of the displacement: the tangent of *all* unknowns times `increment`.
-    pub fn force_increment(&self, displacement: &[f64], increment: &[f64]) -> Vec<f64> {
+    pub fn force_increment(&self, load: f64, displacement: &[f64], increment: &[f64]) -> Vec<f64> {
         self.assemble_forces(|cell| {
             let gradient = self.deformation_gradient(displacement, cell);
-            self.material.stress_increment(&gradient, &self.displacement_gradient(increment, cell))
+            self.law(load, cell).stress_increment(&gradient, &self.displacement_gradient(increment, cell))
+        })
+    }
+
+    /// Derivative of the internal forces with respect to the load while the displacement changes by `rate` per unit load: the
+    /// [increment](Self::force_increment), and `∂P/∂g dg/ds` where the body grows.
+    pub fn force_rate(&self, load: f64, displacement: &[f64], rate: &[f64]) -> Vec<f64> {
+        if self.growth.factors().is_empty() {
+            return self.force_increment(load, displacement, rate);
+        }
+        self.assemble_forces(|cell| {
+            let (law, gradient) = (self.law(load, cell), self.deformation_gradient(displacement, cell));
+            law.stress_increment(&gradient, &self.displacement_gradient(rate, cell))
+                + law.stress_by_growth(&gradient) * self.growth.slope(cell)
         })
     }
 
@@ -288,14 +338,14 @@ impl<'m, const D: usize> Body<'m, D> {
 
     /// Assembles the tangent `K = ∂f/∂U` of the free unknowns, `K_(ai)(bk) = V Σ ∂P_iJ/∂F_kL ∂_Jλ_a ∂_Lλ_b`, into a matrix of
     /// this body's [`Self::pattern`].
-    pub fn assemble_tangent(&self, displacement: &[f64], tangent: &mut SymmetricMatrix) {
+    pub fn assemble_tangent(&self, load: f64, displacement: &[f64], tangent: &mut SymmetricMatrix) {
         let columns_of = |cell: usize| {
-            let gradient = self.deformation_gradient(displacement, cell);
+            let (law, gradient) = (self.law(load, cell), self.deformation_gradient(displacement, cell));
             let mut columns = [[Tensor::<D>::zeros(); D]; MOST_CORNERS];
             for (shape, columns) in self.cell_gradients(cell).iter().zip(&mut columns) {
                 for (k, column) in columns.iter_mut().enumerate() {
                     let increment = Tensor::from_fn(|i, j| if i == k { self.volumes[cell] * shape[j] } else { 0.0 });
-                    *column = self.material.stress_increment(&gradient, &increment);
+                    *column = law.stress_increment(&gradient, &increment);
                 }
             }
             columns
@@ -382,19 +432,19 @@ mod tests {
         let (u, du) = (wobble(body.unknowns(), 0.02), wobble(2 * body.unknowns(), 1.0).split_off(body.unknowns()));
         let shifted = |h: f64| -> Vec<f64> { u.iter().zip(&du).map(|(u, d)| u + h * d).collect() };
         let h = 1e-4;
-        let slope = (body.energy(&shifted(h)) - body.energy(&shifted(-h))) / (2.0 * h);
-        let work: f64 = body.internal_forces(&u).iter().zip(&du).map(|(f, d)| f * d).sum();
+        let slope = (body.energy(0.4, &shifted(h)) - body.energy(0.4, &shifted(-h))) / (2.0 * h);
+        let work: f64 = body.internal_forces(0.4, &u).iter().zip(&du).map(|(f, d)| f * d).sum();
         assert!((slope - work).abs() < 1e-6 * work.abs().max(1.0), "{slope} {work}");
-        let (after, before) = (body.internal_forces(&shifted(h)), body.internal_forces(&shifted(-h)));
-        for (i, increment) in body.force_increment(&u, &du).iter().enumerate() {
+        let (after, before) = (body.internal_forces(0.4, &shifted(h)), body.internal_forces(0.4, &shifted(-h)));
+        for (i, increment) in body.force_increment(0.4, &u, &du).iter().enumerate() {
             assert!(((after[i] - before[i]) / (2.0 * h) - increment).abs() < 1e-5);
         }
         let mut only_free = vec![0.0; body.unknowns()];
         let free = body.restrict(&du);
         body.add_free(1.0, &free, &mut only_free);
         let mut tangent = SymmetricMatrix::zero(body.pattern());
-        body.assemble_tangent(&u, &mut tangent);
-        let direct = body.restrict(&body.force_increment(&u, &only_free));
+        body.assemble_tangent(0.4, &u, &mut tangent);
+        let direct = body.restrict(&body.force_increment(0.4, &u, &only_free));
         for (assembled, direct) in tangent.multiply(&free).iter().zip(&direct) {
             assert!((assembled - direct).abs() < 1e-13 * 50.0);
         }
@@ -414,7 +464,7 @@ mod tests {
         let mesh = structured_rectangle(1.5, 1.0, 3, 2).unwrap();
         let body = clamped_below(&mesh, Arc::new(StVenantKirchhoff { lame: lame() })).unwrap();
         let u = wobble(body.unknowns(), 0.03);
-        let forces = body.internal_forces(&u);
+        let forces = body.internal_forces(0.4, &u);
         let [x, y] = body.resultant(&forces, 0..mesh.vertex_count());
         let moment: f64 = (0..mesh.vertex_count())
             .map(|v| {

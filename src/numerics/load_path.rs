@@ -253,9 +253,9 @@ impl<const D: usize> PathSolver<'_, '_, D> {
                 source: Box::new(source),
             })
         };
-        let defect = |interpolated: &[f64], exact: &[f64]| {
+        let defect = |load: f64, interpolated: &[f64], exact: &[f64]| {
             let distance = interpolated.iter().zip(exact).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
-            if body.admissible(interpolated) { distance / body.size() } else { f64::INFINITY }
+            if body.admissible(load, interpolated) { distance / body.size() } else { f64::INFINITY }
         };
         refine_path(marched, evaluate, defect, goal)
     }
@@ -269,7 +269,7 @@ impl<const D: usize> PathSolver<'_, '_, D> {
             for sample in 1..SAMPLES {
                 let at = from + (to - from) * sample as f64 / SAMPLES as f64;
                 path.evaluate(at, &mut displacement);
-                if !self.body.admissible(&displacement) {
+                if !self.body.admissible(at, &displacement) {
                     let worst = Box::new(self.body.worst_cell(&displacement));
                     return Err(LoadPathError::InterpolantInverted { from, to, at, worst });
                 }

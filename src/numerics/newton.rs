@@ -9,8 +9,8 @@
 //! iteration stops at the energy norm `√|δ·f|` of that step, relative to `√(2W)`. The number of negative eigenvalues comes from the LDLT factor: an equilibrium
 //! with any is found all the same, but it is not stable.
 //!
-//! The rate `dU/ds` follows from one more solve with the factor in hand, `K_ff dU_f/ds = −K_fp a`, since the last step was
-//! below the tolerance: nothing is factored for it.
+//! The rate `dU/ds` follows from one more solve with the factor in hand, `K_ff dU_f/ds = −K_fp a − ∂f_f/∂s` (the last term where the
+//! body grows), since the last step was below the tolerance: nothing is factored for it.
 
 use crate::numerics::hyperelasticity::{Body, WorstCell};
 use crate::numerics::sparse::{Factor, SparseError, SymmetricMatrix};
@@ -125,6 +125,7 @@ pub fn equilibrium<const D: usize>(
 
 struct Newton<'b, 'm, const D: usize> {
     body: &'b Body<'m, D>,
+    load: f64,
     displacement: Vec<f64>,
     tangent: SymmetricMatrix,
     iterations: usize,
@@ -147,14 +148,14 @@ impl<'b, 'm, const D: usize> Newton<'b, 'm, D> {
         displacement.resize(body.unknowns(), f64::NAN);
         body.impose(load, &mut displacement);
         let tangent = SymmetricMatrix::zero(body.pattern());
-        Self { body, displacement, tangent, iterations: 0, residual: f64::INFINITY }
+        Self { body, load, displacement, tangent, iterations: 0, residual: f64::INFINITY }
     }
 
     fn solve(&mut self, options: &NewtonOptions) -> Result<Equilibrium, Failure> {
         if !self.displacement.iter().all(|u| u.is_finite()) {
             return Err(Failure::Guess);
         }
-        if !self.body.admissible(&self.displacement) {
+        if !self.body.admissible(self.load, &self.displacement) {
             return Err(Failure::Inverted);
         }
         while self.iterations < options.max_iterations {
@@ -182,7 +183,7 @@ impl<'b, 'm, const D: usize> Newton<'b, 'm, D> {
             let norm = self.relative_norm(&step);
             let mut trial = self.displacement.clone();
             self.body.add_free(1.0, &step.direction, &mut trial);
-            if norm > FAST * self.residual || !self.body.admissible(&trial) {
+            if norm > FAST * self.residual || !self.body.admissible(self.load, &trial) {
                 break;
             }
             (self.displacement, self.residual) = (trial, norm);
@@ -191,12 +192,12 @@ impl<'b, 'm, const D: usize> Newton<'b, 'm, D> {
     }
 
     fn factor(&mut self) -> Result<Factor, Failure> {
-        self.body.assemble_tangent(&self.displacement, &mut self.tangent);
+        self.body.assemble_tangent(self.load, &self.displacement, &mut self.tangent);
         Ok(self.tangent.ldlt()?)
     }
 
     fn step(&self, factor: &Factor) -> Result<Step, Failure> {
-        let forces = self.body.restrict(&self.body.internal_forces(&self.displacement));
+        let forces = self.body.restrict(&self.body.internal_forces(self.load, &self.displacement));
         let mut direction: Vec<f64> = forces.iter().map(|force| -force).collect();
         factor.solve(&mut direction)?;
         if !direction.iter().all(|value| value.is_finite()) {
@@ -204,7 +205,7 @@ impl<'b, 'm, const D: usize> Newton<'b, 'm, D> {
         }
         Ok(Step {
             slope: dot(&forces, &direction),
-            energy: self.body.energy(&self.displacement),
+            energy: self.body.energy(self.load, &self.displacement),
             force: dot(&forces, &forces).sqrt(),
             stable: factor.negative_eigenvalues() == 0,
             direction,
@@ -229,7 +230,7 @@ impl<'b, 'm, const D: usize> Newton<'b, 'm, D> {
         (0..=HALVINGS).map(|halvings| 0.5f64.powi(halvings)).find_map(|length| {
             let mut trial = self.displacement.clone();
             self.body.add_free(length, &step.direction, &mut trial);
-            let good = self.body.admissible(&trial) && (converged || self.is_better(&trial, length, step));
+            let good = self.body.admissible(self.load, &trial) && (converged || self.is_better(&trial, length, step));
             good.then_some(trial)
         })
     }
@@ -240,9 +241,9 @@ impl<'b, 'm, const D: usize> Newton<'b, 'm, D> {
         const NOISE: f64 = 1e-10;
         if step.stable {
             step.slope.abs() <= NOISE * step.energy
-                || self.body.energy(trial) <= step.energy + ENOUGH * length * step.slope
+                || self.body.energy(self.load, trial) <= step.energy + ENOUGH * length * step.slope
         } else {
-            let forces = self.body.restrict(&self.body.internal_forces(trial));
+            let forces = self.body.restrict(&self.body.internal_forces(self.load, trial));
             dot(&forces, &forces).sqrt() <= (1.0 - ENOUGH * length) * step.force
         }
     }
@@ -251,14 +252,14 @@ impl<'b, 'm, const D: usize> Newton<'b, 'm, D> {
         let body = self.body;
         let mut rate = vec![0.0; body.unknowns()];
         body.impose(1.0, &mut rate);
-        let mut free = body.restrict(&body.force_increment(&self.displacement, &rate));
+        let mut free = body.restrict(&body.force_rate(self.load, &self.displacement, &rate));
         factor.solve(&mut free)?;
         body.add_free(-1.0, &free, &mut rate);
         let (min_jacobian, min_jacobian_cell) = body.lowest_jacobian(&self.displacement);
         Ok(Equilibrium {
             displacement: self.displacement.clone(),
             rate,
-            energy: body.energy(&self.displacement),
+            energy: body.energy(self.load, &self.displacement),
             iterations: self.iterations,
             residual: self.residual,
             min_jacobian,
@@ -312,7 +313,7 @@ mod tests {
             for (i, rate) in here.rate.iter().enumerate() {
                 assert!(((after.displacement[i] - before.displacement[i]) / 0.002 - rate).abs() < 1e-6);
             }
-            let forces = body.internal_forces(&here.displacement);
+            let forces = body.internal_forces(0.2, &here.displacement);
             let work: f64 = forces.iter().zip(&here.rate).map(|(force, rate)| force * rate).sum();
             assert!(((after.energy - before.energy) / 0.002 - work).abs() < 1e-7);
             assert!(here.negative_eigenvalues == 0 && here.residual <= 1e-12);

@@ -295,13 +295,15 @@ impl Draft {
     }
 }
 
-/// What a block's check may know of the scene. Names of blocks that are broken still count.
+/// What a block's check may know of the scene; the laws of material are the roster's to add. Names of blocks that are broken still
+/// count.
 pub fn facts(scene: &Scene, document: &Value) -> Facts {
     Facts {
         populations: scene.populations.keys().cloned().collect(),
         edges: scene.tissue.outline.edge_names(),
         blocks: document.as_object().cloned().unwrap_or_default(),
         duration: scene.time.duration.0,
+        ..Facts::default()
     }
 }
 

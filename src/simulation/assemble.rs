@@ -8,7 +8,7 @@ use crate::model::clock::{Clock, Kinks, StageTime, TimeGrid};
 use crate::model::growth::{Growth, Method, OnBorder, Population, Populations, Targets};
 use crate::model::health::{Counters, Health};
 use crate::model::integrator::{advance, bring_tissue_to};
-use crate::model::mechanism::{InstallError, Installable, ModelBuilder, Roster};
+use crate::model::mechanism::{Facts, InstallError, Installable, ModelBuilder, Roster};
 use crate::model::observables::Observables;
 use crate::model::plan::{Each, Plan};
 use crate::model::remodel::Unrest;
@@ -61,6 +61,7 @@ pub(super) fn assemble(loaded: &Loaded, roster: &Roster, shelf: &Shelf) -> Resul
     world.init_resource::<Health>();
     world.init_resource::<Observables>();
     world.insert_resource(shelf.clone());
+    world.insert_resource(roster.materials().clone());
     world.insert_resource(clock(scene)?);
     world.insert_resource(StageTime(0.0));
     world.insert_resource(growth(scene));
@@ -90,7 +91,7 @@ pub(super) fn assemble(loaded: &Loaded, roster: &Roster, shelf: &Shelf) -> Resul
 
 /// Reads the blocks in the roster's order and lets each check itself against the scene.
 fn read_blocks(loaded: &Loaded, roster: &Roster) -> Result<Vec<Chosen>, AssemblyError> {
-    let facts = facts(&loaded.scene, &loaded.merged);
+    let facts = Facts { materials: roster.materials().clone(), ..facts(&loaded.scene, &loaded.merged) };
     let mut chosen = Vec::new();
     let mut wrong = Vec::new();
     for (slot, entry) in roster.entries.iter().enumerate() {

@@ -2,7 +2,7 @@
 
 use crate::model::clock::Clock;
 use crate::model::health::Fault;
-use crate::model::mechanism::{Entry, Roster};
+use crate::model::mechanism::{Entry, Facts, Roster};
 use crate::model::shelf::Shelf;
 use crate::model::violation::Violation;
 use crate::record::manifest::Manifest;
@@ -77,9 +77,10 @@ pub fn read_document(name: &str, value: Value, roster: &Roster) -> Result<Loaded
 /// The schema and the checks of every mechanism of a roster.
 pub fn block_schemas(roster: &Roster) -> Vec<BlockSchema> {
     let block = |entry: &Entry| {
-        let entry = *entry;
-        BlockSchema::new(entry.name, (entry.schema)()).checked_by(move |value, facts| match (entry.read)(value) {
+        let (entry, materials) = (*entry, roster.materials().clone());
+        BlockSchema::new(entry.name, roster.schema(&entry)).checked_by(move |value, facts| match (entry.read)(value) {
             Ok(law) => {
+                let facts = &Facts { materials: materials.clone(), ..facts.clone() };
                 let shapes = law.outlines().into_iter().map(|(name, shape)| (format!("/{name}"), shape)).collect();
                 BlockFindings { violations: law.check(facts), shapes }
             }

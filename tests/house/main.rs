@@ -19,6 +19,7 @@ const SEAM: &[&str] = &["serde", "serde_json", "serde_path_to_error", "schemars"
 /// Files of the model that belong to the seam and may name serde and schemars.
 const SEAM_FILES: &[&str] = &[
     "src/model/mechanism.rs",
+    "src/model/material_law.rs",
     "src/model/quantity.rs",
     "src/model/quantity_macro.rs",
     "src/model/keys.rs",

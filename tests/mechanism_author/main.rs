@@ -11,7 +11,9 @@ mod example;
 #[path = "../verification/figures.rs"]
 mod figures;
 mod front;
+mod fung;
 mod galvanotaxis;
+mod materials;
 #[path = "../../assets/new_mechanism/mechanism.rs"]
 mod steady_pull;
 mod trajectories;

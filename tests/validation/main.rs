@@ -10,4 +10,5 @@ mod mechanisms;
 mod noise;
 mod remodelling;
 mod tissue;
+mod tissue_growth;
 mod turning;

@@ -74,7 +74,7 @@ fn check_uniaxial(body: &Body<'_, 2>, poisson: f64, row: &Value, found: &Equilib
     close(2.0 * found.rate[2 * right] / WIDTH, at("dlambda_x_dlambda_y"), 1e-10, &what("its rate"));
     close(found.min_jacobian, at("detF"), 1e-11, &what("det F"));
     close(found.energy / (WIDTH * HEIGHT), at("energy_density"), 1e-12, &what("energy"));
-    let forces = body.internal_forces(&found.displacement);
+    let forces = body.internal_forces(1.0, &found.displacement);
     close(reaction_of_the_top(body, &forces) / WIDTH, at("P_yy"), 1e-12, &what("P_yy"));
     let gradient = Matrix2::new(across, 0.0, 0.0, at("lambda_y"));
     // The table's minimum is over 720 directions: the closed form repeats it there, and ours is that over all directions.
@@ -105,7 +105,7 @@ fn the_force_on_the_block_has_its_maximum_at_a_stretch_of_one_over_root_three() 
     let peak = 1.0 / 3f64.sqrt();
     let states = march(&body, &[0.9, 0.8, 0.7, 0.65, 0.6, peak + 1e-4, peak - 1e-4]);
     let stiffness = |state: &Equilibrium| {
-        reaction_of_the_top(&body, &body.force_increment(&state.displacement, &state.rate)) / WIDTH
+        reaction_of_the_top(&body, &body.force_increment(1.0, &state.displacement, &state.rate)) / WIDTH
     };
     let [.., before, after] = &states[..] else { unreachable!() };
     // dP/dλ = E'/2 (3λ² − 1), E' = E/(1 − ν²).
@@ -150,7 +150,7 @@ fn a_homogeneous_state_is_found_exactly_on_a_distorted_mesh_by_both_materials() 
                 close(u[2 * vertex], exact.x, 1e-13, "u_x");
                 close(u[2 * vertex + 1], exact.y, 1e-13, "u_y");
             }
-            close(body.energy(&u), WIDTH * HEIGHT * material.energy(&gradient), 1e-13, "energy");
+            close(body.energy(1.0, &u), WIDTH * HEIGHT * material.energy(&gradient), 1e-13, "energy");
             let stress = material.stress(&body.deformation_gradient(&u, 17));
             assert!((stress - material.stress(&gradient)).norm() < 1e-12);
         }
@@ -171,8 +171,8 @@ fn a_rigid_rotation_costs_nothing() {
             let strain = rotation(degrees) - Matrix2::identity();
             let u: Vec<f64> =
                 mesh.vertices().iter().flat_map(|x| <[f64; 2]>::from(strain * Vector2::from(*x))).collect();
-            close(body.energy(&u), 0.0, 1e-15, "energy");
-            assert!(body.internal_forces(&u).iter().all(|force| force.abs() < 1e-14), "{degrees}");
+            close(body.energy(1.0, &u), 0.0, 1e-15, "energy");
+            assert!(body.internal_forces(1.0, &u).iter().all(|force| force.abs() < 1e-14), "{degrees}");
             close(body.lowest_jacobian(&u).0, 1.0, 1e-14, "det F");
         }
     }

@@ -42,7 +42,7 @@ fn the_discrete_solution_is_that_of_the_independent_codes_in_no_more_iterations(
             let u = largest_defect(&found.displacement, &nodes, &case["u"][k]);
             let rate = largest_defect(&found.rate, &nodes, &case["du_ds"][k]);
             assert!(u < 1e-13 && rate < 1e-12, "{what}: u {u:e}, du/ds {rate:e}");
-            let reaction = reaction_of_the_top(&body, &body.internal_forces(&found.displacement));
+            let reaction = reaction_of_the_top(&body, &body.internal_forces(1.0, &found.displacement));
             for (found, key) in
                 [(found.energy, "energy"), (found.min_jacobian, "min_detF"), (reaction, "reaction_top_y")]
             {

@@ -254,7 +254,7 @@ fn force(case: Case, points: usize) -> Result<Force, RunError> {
     let mesh = block(4)?;
     let body = pressed(&mesh, case, false)?;
     let at = |stretch: f64| {
-        let forces = body.internal_forces(&homogeneous(&body, case, stretch));
+        let forces = body.internal_forces(1.0, &homogeneous(&body, case, stretch));
         let top = (0..mesh.vertex_count()).filter(|&v| mesh.vertices()[v][1] == BLOCK[1]);
         -body.resultant(&forces, top)[1] / BLOCK[0]
     };
@@ -278,7 +278,7 @@ pub fn inertia(case: Case, rows: usize) -> Result<Inertia, RunError> {
     let body = pressed(&mesh, case, false)?;
     let mut tangent = SymmetricMatrix::zero(body.pattern());
     let first_negative = first(26, |stretch| {
-        body.assemble_tangent(&homogeneous(&body, case, stretch), &mut tangent);
+        body.assemble_tangent(1.0, &homogeneous(&body, case, stretch), &mut tangent);
         Ok(tangent.ldlt().map_or(true, |factor| factor.negative_eigenvalues() > 0))
     })?;
     let per_side = first_negative.map(|stretch| 50.0 * (1.0 - stretch));

@@ -135,7 +135,7 @@ pub fn find_fascicles(positions: &[f64], linkage: f64) -> Fascicles {
         mean_size: statistics::mean(&bundles),
         mean_size_per_axon: largest.map(|_| sizes.iter().map(|&s| (s * s) as f64).sum::<f64>() / axons),
         largest_fraction: largest.map(|size| size as f64 / axons),
-        bundled_fraction: largest.map(|_| bundles.iter().sum::<f64>() / axons),
+        bundled_fraction: largest.map(|_| bundles.iter().fold(0.0, |sum, size| sum + size) / axons),
     }
 }
 

@@ -347,18 +347,8 @@ fn run_once(cli: &Cli, roster: &Roster, loaded: &Loaded, folder: &Path) -> Resul
     bar.finish_and_clear();
     write_results(folder, loaded, &finished)?;
     let summary = &finished.summary;
-    let (counts, hits) = (&summary.counts, &summary.morphology.hits);
-    say!(
-        "{}: t = {} h; {} axons: {} arrived, {} growing, {} stalled, {} left, {} unborn",
-        summary.scene,
-        summary.time,
-        counts.axons,
-        counts.arrived,
-        counts.growing,
-        counts.stalled,
-        counts.left,
-        counts.unborn
-    );
+    let hits = &summary.morphology.hits;
+    say!("{}: t = {} h; {}", summary.scene, (summary.time * 1e6).round() / 1e6, summary.counts);
     if let Some(fraction) = hits.fraction {
         say!("hit fraction {fraction:.3}");
     }

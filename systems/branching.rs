@@ -19,7 +19,7 @@ keys! {
     /// New growth cones from old ones; dP = r c/(c_half + c) dt.
     pub struct Branching {
         /// Rate r at which a growing cone branches at most. Ours.
-        #[schemars(extend("minimum" = 0.0, "x-typical" = [0.005, 0.2]))]
+        #[schemars(extend("minimum" = 0.0, "maximum" = 100.0, "x-typical" = [0.005, 0.2]))]
         pub rate: Rate = Rate(0.03),
         /// Whether the cone itself splits or the shaft behind it sprouts.
         pub kind: BranchKind = BranchKind::Splitting,
@@ -93,6 +93,11 @@ impl Mechanism for Branching {
             world.insert_resource(Buds { seed, stream, cue });
             Ok(())
         });
+        let spares = model.world.resource::<Shafts>().count() as u64 * self.most / (1 + self.most);
+        model.plan().keep(
+            "cones for branches",
+            format!("{spares} wait for branches; what is expected of cones leaves them out"),
+        );
         model.insert_law(self).phase(Phase::Remodel, branch);
         Ok(())
     }
@@ -132,7 +137,8 @@ fn branch(
     };
     let standing = remodelling.standing();
     for (i, cone) in standing.iter().enumerate().filter(|(_, cone)| cone.status == Status::Growing) {
-        while budding[i].next <= now {
+        let mut cone = *cone;
+        while budding[i].next <= now && remodelling.may_branch(cone.identity.axon) {
             let count = budding[i].count;
             let mut draws = KeyedRng::new(buds.seed, cone.identity.axon, buds.stream, 2 * count + 1);
             let (kept, side, place) = (draws.share(), draws.share(), draws.share());
@@ -141,9 +147,9 @@ fn branch(
                 next: budding[i].next + waiting_time(buds.seed, buds.stream, after, law.rate.0),
                 count: count + 1,
             };
-            if kept < factor(cone, &remodelling.tissue) {
+            if kept < factor(&cone, &remodelling.tissue) {
                 let angle = law.angle.radians() * if side < 0.5 { 1.0 } else { -1.0 };
-                if let Some(branch) = begin(&mut remodelling, law.kind, cone, (angle, place)) {
+                if let Some(branch) = begin(&mut remodelling, law.kind, &mut cone, (angle, place)) {
                     let first = waiting_time(buds.seed, buds.stream, (branch, 0), law.rate.0);
                     budding[branch as usize] = Budding { next: now + first, count: 0 };
                 }
@@ -153,12 +159,18 @@ fn branch(
 }
 
 /// Begins a branch at an angle (rad); a collateral at the vertex that a share in [0, 1) of them all names.
-fn begin(remodelling: &mut Remodelling, kind: BranchKind, cone: &Standing, (angle, share): (f64, f64)) -> Option<u32> {
+fn begin(
+    remodelling: &mut Remodelling,
+    kind: BranchKind,
+    cone: &mut Standing,
+    (angle, share): (f64, f64),
+) -> Option<u32> {
     let parent = cone.identity.axon;
     match kind {
         BranchKind::Splitting => {
             let branch = remodelling.sprout(parent, Place::Tip, turned(cone.heading, 0.5 * angle))?;
-            remodelling.head(parent, turned(cone.heading, -0.5 * angle));
+            cone.heading = turned(cone.heading, -0.5 * angle);
+            remodelling.head(parent, cone.heading);
             Some(branch)
         }
         BranchKind::Collateral => {

@@ -9,7 +9,7 @@
 //! which strikes out what it had laid. Collapse: where a cue exceeds a concentration, by a distance (Luo, Raible and Raper, Cell 75, 1993,
 //! doi:10.1016/0092-8674(93)80064-L, collapse by collapsin; the distance is ours). Pruning: a cone that has not arrived a given time after its birth
 //! draws back until it is gone (Luo and O'Leary, Annu. Rev. Neurosci. 28, 2005, doi:10.1146/annurev.neuro.28.061604.135632; the rule is ours).
-//! A fork whose branch still stands holds the cone: a trunk does not leave its branches behind.
+//! A fork whose branch still stands holds the cone, which stalls there: a trunk does not leave its branches behind.
 
 use crate::prelude::*;
 
@@ -94,11 +94,17 @@ enum Course {
     Back(f64),
 }
 
+impl Retraction {
+    /// Whether a cone that has not arrived at an age (h) is withdrawn.
+    fn is_lost(&self, age: f64) -> bool {
+        self.prune_after.is_some_and(|after| age >= after.0)
+    }
+}
+
 /// What a standing cone does next: `age` (h) since its birth, `concentration` (nM) of the cue of collapse where it is.
 fn course(law: &Retraction, status: Status, age: f64, concentration: f64) -> Course {
-    let lost = law.prune_after.is_some_and(|after| age >= after.0);
     match status {
-        Status::Growing | Status::Stalled if lost => Course::Back(f64::INFINITY),
+        Status::Growing | Status::Stalled if law.is_lost(age) => Course::Back(f64::INFINITY),
         Status::Growing => match &law.collapse {
             Some(collapse) if concentration > collapse.above.0 => Course::Back(collapse.distance.0),
             _ => Course::On,
@@ -125,15 +131,18 @@ fn retract(
             }
             _ => 0.0,
         };
+        let age = now - cone.identity.birth_time;
         if cone.status == Status::Retracting {
             retreat[i].left = draw_back(&mut remodelling, cone, (retreat[i].left, step));
-        } else if let Course::Back(by) = course(&law, cone.status, now - cone.identity.birth_time, concentration) {
+        } else if let Course::Back(by) = course(&law, cone.status, age, concentration)
+            && !(cone.status == Status::Stalled && remodelling.is_held(i as u32))
+        {
             retreat[i].left = by;
             remodelling.set_status(i as u32, Status::Retracting);
+            remodelling.unrest.0 = true;
         }
-        let may_yet = matches!(cone.status, Status::Growing | Status::Retracting)
-            || (cone.status == Status::Stalled && law.prune_after.is_some());
-        remodelling.unrest.0 |= may_yet;
+        let waits = cone.status == Status::Stalled && law.prune_after.is_some() && !law.is_lost(age);
+        remodelling.unrest.0 |= waits || matches!(cone.status, Status::Growing | Status::Retracting);
     }
 }
 
@@ -145,8 +154,9 @@ fn draw_back(remodelling: &mut Remodelling, cone: &Standing, (left, step): (f64,
     let short = remodelling.draw_back(number, by);
     let rest = left - by;
     if left.is_infinite() {
-        if short > 0.0 && remodelling.is_at_origin(number) {
-            remodelling.set_status(number, Status::Withdrawn);
+        if short > 0.0 {
+            let gone = remodelling.is_at_origin(number);
+            remodelling.set_status(number, if gone { Status::Withdrawn } else { Status::Stalled });
         }
     } else if rest <= 0.0 || short > 0.0 {
         remodelling.set_status(number, Status::Growing);

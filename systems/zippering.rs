@@ -11,11 +11,11 @@
 //! arms and the zipped part; that is the formula above, along the bisector, where they are alike. Mouse olfactory axons: T = 679 pN, S = 102 pN
 //! (52 to 186), β of 51° on average, 0.3 to 2 µm/min.
 //!
-//! Shafts zip once both have stopped growing. A crossing opens into two points that move apart, on the sides where the shafts meet at less
+//! Shafts zip once both have stopped growing, and let go when one begins to retract. A crossing opens into two points that move apart, on the sides where the shafts meet at less
 //! than 90°. Ours: an arm is pulled straight over `arm` of its length; a pair zips at its first crossing only; a crossing within `arm` of the
 //! end of a shaft, of a fork or of another zipper point is left alone, and zipper points stop there; drag of the zipped part is neglected.
 
-use crate::numerics::zipper::{Arms, Balance, crossing};
+use crate::numerics::zipper::{Arms, Balance, BoxedLine};
 use crate::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -29,7 +29,7 @@ keys! {
         #[schemars(extend("minimum" = 0.0, "x-typical" = [0.0, 200.0]))]
         pub adhesion: Force = Force(102.0),
         /// Drag η_Z of a zipper point. Ours: 1.4 µm/min where β is small.
-        #[schemars(extend("exclusiveMinimum" = 0.0, "x-typical" = [0.5, 5.0]))]
+        #[schemars(extend("minimum" = 0.05, "x-typical" = [0.5, 5.0]))]
         pub drag: Drag = Drag(1.2),
         /// Elongational viscosity η_e of a shaft. Ours.
         #[schemars(extend("minimum" = 0.0, "x-typical" = [0.0, 1000.0]))]
@@ -72,23 +72,30 @@ struct Bond {
     same: bool,
 }
 
+impl Bond {
+    /// The other shaft, if one is bound.
+    fn partner(&self, shaft: u32) -> Option<u32> {
+        let [one, other] = self.shafts;
+        if one == shaft { Some(other) } else { (other == shaft).then_some(one) }
+    }
+}
+
 /// The zippers of a run.
 #[derive(Debug, Clone, Default, Resource)]
 pub struct Zippers {
     last: f64,
     resting: BTreeSet<u32>,
     lines: BTreeMap<u32, Vec<Node>>,
-    bonds: Vec<Bond>,
+    /// None where a shaft has gone back to grow or to retract.
+    bonds: Vec<Option<Bond>>,
     /// Shafts that have to be laid anew.
     changed: BTreeSet<u32>,
 }
 
 /// Farthest that a zipper point moves at once (µm).
 const STRIDE: f64 = 0.25;
-/// Longest time that its speed is taken as constant (h).
-const INSTANT: f64 = 0.02;
 /// Slower than this (µm/h), a point is at rest.
-const REST: f64 = 0.05;
+const REST: f64 = 0.3;
 
 impl Mechanism for Zippering {
     const NAME: &'static str = "zippering";
@@ -123,83 +130,114 @@ impl Zippers {
     /// Shafts that zip, in pairs, with the angle β (rad) at both ends now.
     pub fn angles(&self, place: impl Fn(Site) -> Vector3<f64>) -> Vec<[f64; 2]> {
         let angle = |bond: usize, forward: bool| self.arms((bond, forward), &place).map_or(0.0, |arms| arms.angle());
-        (0..self.bonds.len()).map(|bond| [angle(bond, false), angle(bond, true)]).collect()
+        let bound = (0..self.bonds.len()).filter(|&bond| self.bonds[bond].is_some());
+        bound.map(|bond| [angle(bond, false), angle(bond, true)]).collect()
     }
 
-    /// Looks for crossings of shafts that have come to rest with all that rest.
+    /// Lets go of shafts that no longer rest, and looks for crossings of those that have come to rest with all that rest.
     fn welcome(&mut self, law: &Zippering, remodelling: &Remodelling) {
         let standing = remodelling.standing();
-        let rests = |status| matches!(status, Status::Arrived | Status::Stalled | Status::Left);
-        for cone in standing.iter().filter(|cone| rests(cone.status)) {
-            let number = cone.identity.axon;
-            if self.resting.contains(&number) {
-                continue;
-            }
+        let rests = |number: u32| {
+            let status = standing.get(number as usize).map(|cone| cone.status);
+            matches!(status, Some(Status::Arrived | Status::Stalled | Status::Left))
+        };
+        for gone in self.resting.iter().copied().filter(|&number| !rests(number)).collect::<Vec<_>>() {
+            self.release(gone);
+        }
+        let known = |number: &u32| self.resting.contains(number);
+        let new: Vec<u32> = (0..standing.len() as u32).filter(|number| rests(*number) && !known(number)).collect();
+        if new.is_empty() {
+            return;
+        }
+        let mut boxed: BTreeMap<u32, BoxedLine> =
+            self.lines.iter().map(|(&number, line)| (number, places(remodelling, line))).collect();
+        for number in new {
             let line = nodes(remodelling, number);
-            let places: Vec<Vector3<f64>> = line.iter().map(|node| remodelling.position(node.point.site)).collect();
+            boxed.insert(number, places(remodelling, &line));
             self.lines.insert(number, line);
-            let reach = bounds(&places);
-            for &other in &self.resting.clone() {
-                let others: Vec<_> =
-                    self.lines[&other].iter().map(|node| remodelling.position(node.point.site)).collect();
-                if overlap(&reach, &bounds(&others)) {
-                    self.bind(law, remodelling, [number, other]);
+            for other in self.resting.iter().copied().collect::<Vec<_>>() {
+                if self.bind(law, remodelling, ([number, other], &boxed)) {
+                    for shaft in [number, other] {
+                        boxed.insert(shaft, places(remodelling, &self.lines[&shaft]));
+                    }
                 }
             }
             self.resting.insert(number);
         }
     }
 
-    /// Binds two shafts at their first crossing, if it is far from whatever holds them.
-    fn bind(&mut self, law: &Zippering, remodelling: &Remodelling, shafts: [u32; 2]) {
-        let places = shafts.map(|shaft| {
-            let line = &self.lines[&shaft];
-            line.iter().map(|node| remodelling.position(node.point.site)).collect::<Vec<_>>()
-        });
-        let Some(found) = crossing(&places[0], &places[1]) else { return };
-        let clear = |k: usize| is_clear(&self.lines[&shafts[k]], &places[k], found[k], law.arm.0);
+    /// Forgets a shaft; its partners keep the shape that they have.
+    fn release(&mut self, shaft: u32) {
+        self.resting.remove(&shaft);
+        self.lines.remove(&shaft);
+        self.changed.remove(&shaft);
+        for (number, bond) in self.bonds.iter_mut().enumerate() {
+            let Some(partner) = bond.and_then(|bond| bond.partner(shaft)) else { continue };
+            *bond = None;
+            let of_bond = |node: &&mut Node| matches!(node.held, Some(Held::Zipper { bond, .. }) if bond == number);
+            self.lines.get_mut(&partner).into_iter().flatten().filter(of_bond).for_each(|node| node.held = None);
+        }
+    }
+
+    /// Binds two shafts at their first crossing, if it is far from whatever holds them; returns whether it did.
+    fn bind(
+        &mut self,
+        law: &Zippering,
+        remodelling: &Remodelling,
+        (shafts, boxed): ([u32; 2], &BTreeMap<u32, BoxedLine>),
+    ) -> bool {
+        let [Some(one), Some(other)] = shafts.map(|shaft| boxed.get(&shaft)) else { return false };
+        let Some(found) = one.crossing(other) else { return false };
+        let places = [one.points(), other.points()];
+        let clear = |k: usize| is_clear(&self.lines[&shafts[k]], places[k], found[k], law.arm.0);
         if !(clear(0) && clear(1)) {
-            return;
+            return false;
         }
         let along = |k: usize| places[k][found[k].0 + 1] - places[k][found[k].0];
         let same = along(0).dot(&along(1)) >= 0.0;
         let bond = self.bonds.len();
-        self.bonds.push(Bond { shafts, same });
+        self.bonds.push(Some(Bond { shafts, same }));
         let (segment, share) = found[0];
         let site = remodelling.walked(self.lines[&shafts[0]][segment].point.site, along(0) * share);
         for k in 0..2 {
-            let (segment, _) = found[k];
-            let Some(line) = self.lines.get_mut(&shafts[k]) else { return };
-            let point = ShaftPoint { site, time: line[segment].point.time };
+            let (segment, share) = found[k];
+            let Some(line) = self.lines.get_mut(&shafts[k]) else { return false };
+            let [before, after] = [segment, segment + 1].map(|node| line[node].point.time);
+            let point = ShaftPoint { site, time: before + (share as f32) * (after - before) };
             let held = |late: bool| Some(Held::Zipper { bond, forward: late == (k == 0 || same) });
             line.splice(segment + 1..segment + 1, [false, true].map(|late| Node { point, held: held(late) }));
             self.changed.insert(shafts[k]);
         }
+        true
     }
 
-    /// Moves all zipper points over a time (h); returns the speed of the fastest at the end (µm/h).
+    /// Moves all zipper points over a time (h); returns the speed of the fastest (µm/h).
     fn advance(&mut self, law: &Zippering, remodelling: &Remodelling, span: f64) -> f64 {
         let balance = Balance::from(law);
         let mut fastest = 0.0f64;
-        for bond in 0..self.bonds.len() {
+        for bond in (0..self.bonds.len()).filter(|&bond| self.bonds[bond].is_some()).collect::<Vec<_>>() {
             let mut left = span;
             while left > 0.0 {
-                let mut taken = left.min(INSTANT);
+                let mut taken = left;
                 let velocities = [false, true].map(|forward| {
                     self.straighten((bond, forward), law.arm.0, remodelling);
-                    let arms = self.arms((bond, forward), |site| remodelling.position(site));
-                    let velocity = arms.map_or(Vector3::zeros(), |arms| balance.velocity(&arms));
+                    let Some(arms) = self.arms((bond, forward), |site| remodelling.position(site)) else {
+                        return Vector3::zeros();
+                    };
+                    taken = taken.min(balance.instant(&arms));
+                    let velocity = balance.velocity(&arms);
                     if velocity.norm() > REST { velocity } else { Vector3::zeros() }
                 });
                 let speed = velocities.iter().map(|velocity| velocity.norm()).fold(0.0, f64::max);
-                taken = if speed * taken > STRIDE { STRIDE / speed } else { taken };
+                if speed == 0.0 {
+                    break;
+                }
+                taken = taken.min(STRIDE / speed);
                 for (forward, velocity) in [false, true].into_iter().zip(velocities) {
                     self.shift((bond, forward), velocity * taken, remodelling);
                 }
                 left -= taken;
-                if left <= 0.0 {
-                    fastest = fastest.max(speed);
-                }
+                fastest = fastest.max(speed);
             }
         }
         fastest
@@ -207,7 +245,7 @@ impl Zippers {
 
     /// Place of a zipper point in the line of one of its shafts, and the direction in which its arm goes on there.
     fn place(&self, (bond, forward): (usize, bool), k: usize) -> Option<(u32, usize, isize)> {
-        let Bond { shafts, same } = *self.bonds.get(bond)?;
+        let Bond { shafts, same } = (*self.bonds.get(bond)?)?;
         let held = Some(Held::Zipper { bond, forward });
         let at = self.lines.get(&shafts[k])?.iter().position(|node| node.held == held)?;
         Some((shafts[k], at, if forward == (k == 0 || same) { 1 } else { -1 }))
@@ -290,6 +328,11 @@ fn nodes(remodelling: &Remodelling, shaft: u32) -> Vec<Node> {
     line
 }
 
+/// Where the points of a line are now.
+fn places(remodelling: &Remodelling, line: &[Node]) -> BoxedLine {
+    BoxedLine::new(line.iter().map(|node| remodelling.position(node.point.site)).collect())
+}
+
 /// Whether a crossing at a share of a segment is at least `arm` (µm) of path away from every held node, on a line at these places.
 fn is_clear(line: &[Node], places: &[Vector3<f64>], (segment, share): (usize, f64), arm: f64) -> bool {
     let at = places[segment].lerp(&places[segment + 1], share);
@@ -308,13 +351,4 @@ fn is_clear(line: &[Node], places: &[Vector3<f64>], (segment, share): (usize, f6
         false
     };
     side(&mut (0..=segment).rev()) && side(&mut (segment + 1..line.len()))
-}
-
-fn bounds(places: &[Vector3<f64>]) -> [Vector3<f64>; 2] {
-    let start = [Vector3::repeat(f64::INFINITY), Vector3::repeat(f64::NEG_INFINITY)];
-    places.iter().fold(start, |[low, high], place| [low.inf(place), high.sup(place)])
-}
-
-fn overlap(a: &[Vector3<f64>; 2], b: &[Vector3<f64>; 2]) -> bool {
-    (0..2).all(|k| a[0][k] <= b[1][k] && b[0][k] <= a[1][k])
 }

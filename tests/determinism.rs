@@ -90,18 +90,20 @@ fn the_tree_finds_what_looking_at_every_segment_of_a_deforming_tissue_finds() {
 #[test]
 fn the_tree_finds_what_is_left_when_shafts_are_remodelled_on_any_number_of_threads() {
     let roster = systems::standard();
-    let run = |neighbours: &str, threads: usize| {
+    let run = |border: &str, neighbours: &str, threads: usize| {
         let mut scene = scene(60, 20.0, true);
         scene["fasciculation"] = json!({ "neighbours": neighbours });
-        scene["branching"] = json!({ "rate": 0.1, "most": 3 });
+        scene["growth"] = json!({ "on_border": border });
+        scene["branching"] = json!({ "rate": 0.1, "most": 3, "kind": "collateral" });
         scene["retraction"] =
             json!({ "prune_after": 9, "collapse": { "cue": "repellent", "above": 5, "distance": 15 } });
-        scene["zippering"] = json!({});
+        scene["zippering"] = json!({ "arm": 5 });
         on_threads(threads, || bits(&loaded(&scene, &roster)))
     };
-    let tree = run("tree", 2);
-    assert_eq!(tree, run("all", 2));
-    assert_eq!(tree, run("tree", 1));
+    for border in ["slide", "stall"] {
+        let tree = run(border, "tree", 2);
+        assert_eq!(tree, run(border, "all", 1), "{border}");
+    }
 }
 
 #[test]

@@ -57,10 +57,15 @@ impl SpareCones {
         })
     }
 
+    /// Place of the next spare cone of a cone's axon; none if all are in use.
+    fn next(&self, cone: u32) -> Option<u32> {
+        let first = self.root(cone) * self.each;
+        (first..first + self.each).find(|&place| self.forks[place as usize].is_none())
+    }
+
     /// Takes the next spare cone of a cone's axon for a branch of that cone; none if all are in use.
     fn take(&mut self, fork: Fork) -> Option<u32> {
-        let first = self.root(fork.parent) * self.each;
-        let place = (first..first + self.each).find(|&place| self.forks[place as usize].is_none())?;
+        let place = self.next(fork.parent)?;
         self.forks[place as usize] = Some(fork);
         Some(self.axons + place)
     }
@@ -222,7 +227,7 @@ impl Remodelling<'_, '_> {
         let stored: Vec<_> = self.shafts.vertices(shaft).collect();
         let place = |site: Site| self.configuration.position(&self.tissue.mesh, site);
         let mut tip = place(self.shafts.tip(cone).into());
-        let mut left = length;
+        let (mut left, mut passed) = (length, self.shafts.tip_time(cone));
         for (before, &vertex) in stored.iter().enumerate().rev() {
             let base: Site = self.shafts.point(vertex).into();
             let chord = tip - place(base);
@@ -230,11 +235,12 @@ impl Remodelling<'_, '_> {
             if distance > left {
                 let heading = chord / distance;
                 let site = self.walked(base, heading * (distance - left));
-                self.stand(cone, before + 1, (site, time), Some(heading));
+                let then = passed - (passed - time) * (left / distance) as f32;
+                self.stand(cone, before + 1, (site, then), Some(heading));
                 return 0.0;
             }
             left -= distance;
-            tip = place(base);
+            (tip, passed) = (place(base), time);
             if time <= hold || before == 0 {
                 let heading = (distance > 0.0).then(|| chord / distance);
                 self.stand(cone, before + 1, (base, time), heading);
@@ -255,10 +261,21 @@ impl Remodelling<'_, '_> {
         let pieces = ((reference(&to) - reference(&from)).norm() / self.shafts.mean_segment()).ceil().max(1.0);
         let chord = self.position(to.site) - self.position(from.site);
         let point = |i: usize| {
-            let site = self.walked(from.site, chord * (i as f64 / pieces));
-            ShaftPoint { site, time: from.time }
+            let share = i as f64 / pieces;
+            let site = self.walked(from.site, chord * share);
+            ShaftPoint { site, time: from.time + (to.time - from.time) * share as f32 }
         };
         (1..pieces as usize).map(point).collect()
+    }
+
+    /// Whether the last fork of a cone whose branch still stands is where the cone stands.
+    pub fn is_held(&self, cone: u32) -> bool {
+        self.shafts.tip_time(cone) <= self.hold(cone)
+    }
+
+    /// Whether a cone's axon has a cone left for a branch.
+    pub fn may_branch(&self, cone: u32) -> bool {
+        self.spares.as_ref().is_some_and(|spares| spares.next(cone).is_some())
     }
 
     /// Whether a cone has been drawn back to where it began.

@@ -301,7 +301,7 @@ impl Shafts {
         self.chains[shaft as usize].tip.planar()
     }
 
-    /// Time (h) of the tip: when it came there, or after drawing back the time of the last vertex that is left.
+    /// Time (h) at which the cone came to where its tip is, the first time.
     pub fn tip_time(&self, shaft: u32) -> f32 {
         self.chains[shaft as usize].tip_time
     }

@@ -58,7 +58,9 @@ pub enum FieldPathError {
         tolerance: f64,
     },
     /// A field in time needs too many levels.
-    #[error("{levels} levels in time reach no farther than {time:.6} h; a larger tolerance needs fewer")]
+    #[error(
+        "{levels} levels in time reach no farther than {time:.6} h; each corner of the tissue's load and of the release takes two, and of the others a larger `time_tolerance` needs fewer"
+    )]
     TooManyLevels {
         /// Levels allowed.
         levels: usize,

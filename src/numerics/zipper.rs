@@ -18,14 +18,16 @@ pub struct Arms {
     length: f64,
 }
 
-/// Shorter than this (µm), an arm or a zipped part has no direction.
+/// Shorter than this (µm), a zipped part has no direction.
 const NOTHING: f64 = 1e-6;
+/// Shorter than this (µm), an arm holds its point. Ours.
+const SHORTEST: f64 = 1.0;
 
 impl Arms {
-    /// From the vectors (µm) to where the arms end and to the other end of the zipped part. None for an arm of no length.
+    /// From the vectors (µm) to where the arms end and to the other end of the zipped part. None for an arm shorter than 1 µm.
     pub fn new(arms: [Vector3<f64>; 2], zipped: Vector3<f64>) -> Option<Self> {
         let length = 0.5 * (arms[0].norm() + arms[1].norm());
-        let units = [arms[0].try_normalize(NOTHING)?, arms[1].try_normalize(NOTHING)?];
+        let units = [arms[0].try_normalize(SHORTEST)?, arms[1].try_normalize(SHORTEST)?];
         Some(Self { units, zipped: zipped.try_normalize(NOTHING), length })
     }
 
@@ -54,6 +56,12 @@ impl Balance {
         2.0 * (1.0 - 0.5 * self.adhesion / self.tension).clamp(-1.0, 1.0).acos()
     }
 
+    /// How long (h) a velocity may be taken as constant: half of what an explicit step may take at most, L η_Z/(2T), since the force changes
+    /// by less than 2T/L with the place of the point.
+    pub fn instant(&self, arms: &Arms) -> f64 {
+        0.25 * arms.length * self.drag / self.tension
+    }
+
     /// Velocity of a zipper point (µm/h). One with nothing zipped moves along the bisector of its arms, or not at all if it would unzip.
     pub fn velocity(&self, arms: &Arms) -> Vector3<f64> {
         let (sum, half) = (arms.units[0] + arms.units[1], (0.5 * arms.angle()).cos());
@@ -65,20 +73,76 @@ impl Balance {
     }
 }
 
-/// The first crossing of two polylines in the plane, in the order of the first: on each the segment and the share of it, or none. Touching
-/// ends of segments count once; parallel segments do not cross.
-pub fn crossing(a: &[Vector3<f64>], b: &[Vector3<f64>]) -> Option<[(usize, f64); 2]> {
-    let pairs = a.windows(2).enumerate();
-    pairs.flat_map(|(i, first)| b.windows(2).enumerate().map(move |(j, second)| (i, first, j, second))).find_map(
-        |(i, first, j, second)| {
-            let (u, v, gap) = (first[1] - first[0], second[1] - second[0], second[0] - first[0]);
-            let area = u.x * v.y - u.y * v.x;
-            let share = |w: &Vector3<f64>| (gap.x * w.y - gap.y * w.x) / area;
-            let (s, t) = (share(&v), share(&u));
-            let inside = area != 0.0 && (0.0..1.0).contains(&s) && (0.0..1.0).contains(&t);
-            inside.then_some([(i, s), (j, t)])
-        },
-    )
+/// A polyline (µm) with the boxes of its pieces, so that what is far apart is passed over.
+#[derive(Debug, Clone, PartialEq)]
+pub struct BoxedLine {
+    points: Vec<Vector3<f64>>,
+    boxes: Vec<Box2>,
+}
+
+/// Lowest and highest coordinates.
+type Box2 = [Vector3<f64>; 2];
+
+/// Segments in a box.
+const PIECE: usize = 8;
+
+impl BoxedLine {
+    /// Boxes the pieces of a polyline.
+    pub fn new(points: Vec<Vector3<f64>>) -> Self {
+        let pieces = points.len().saturating_sub(1).div_ceil(PIECE);
+        let boxes = (0..pieces).map(|k| bounds(&points[k * PIECE..points.len().min((k + 1) * PIECE + 1)])).collect();
+        Self { points, boxes }
+    }
+
+    /// Its points (µm).
+    pub fn points(&self) -> &[Vector3<f64>] {
+        &self.points
+    }
+
+    fn segments(&self, piece: usize) -> impl Iterator<Item = (usize, &[Vector3<f64>])> {
+        let first = piece * PIECE;
+        self.points[first..].windows(2).take(PIECE).enumerate().map(move |(i, ends)| (first + i, ends))
+    }
+
+    /// The first crossing with another polyline in the plane, in the order of this one and then of the other: on each the segment and the
+    /// share of it, or none. Touching ends of segments count once; parallel segments do not cross.
+    pub fn crossing(&self, other: &Self) -> Option<[(usize, f64); 2]> {
+        let mut found: Option<[(usize, f64); 2]> = None;
+        for (i, own) in self.boxes.iter().enumerate() {
+            for j in (0..other.boxes.len()).filter(|&j| overlap(own, &other.boxes[j])) {
+                let pairs = self.segments(i).flat_map(|a| other.segments(j).map(move |b| (a, b)));
+                let met = pairs.filter_map(|((k, a), (l, b))| segments_cross(a, b).map(|[s, t]| [(k, s), (l, t)]));
+                found =
+                    met.fold(found, |first, next| first.filter(|first| places(first) <= places(&next)).or(Some(next)));
+            }
+            if found.is_some() {
+                break;
+            }
+        }
+        found
+    }
+}
+
+fn places(crossing: &[(usize, f64); 2]) -> (usize, usize) {
+    (crossing[0].0, crossing[1].0)
+}
+
+/// Shares of two segments at which they cross in the plane.
+fn segments_cross(first: &[Vector3<f64>], second: &[Vector3<f64>]) -> Option<[f64; 2]> {
+    let (u, v, gap) = (first[1] - first[0], second[1] - second[0], second[0] - first[0]);
+    let area = u.x * v.y - u.y * v.x;
+    let share = |w: &Vector3<f64>| (gap.x * w.y - gap.y * w.x) / area;
+    let shares = [share(&v), share(&u)];
+    (area != 0.0 && shares.iter().all(|share| (0.0..1.0).contains(share))).then_some(shares)
+}
+
+fn bounds(points: &[Vector3<f64>]) -> Box2 {
+    let start = [Vector3::repeat(f64::INFINITY), Vector3::repeat(f64::NEG_INFINITY)];
+    points.iter().fold(start, |[low, high], point| [low.inf(point), high.sup(point)])
+}
+
+fn overlap(a: &Box2, b: &Box2) -> bool {
+    (0..2).all(|k| a[0][k] <= b[1][k] && b[0][k] <= a[1][k])
 }
 
 #[cfg(test)]
@@ -111,7 +175,9 @@ mod tests {
         assert!(((0.5 * beta).cos() - (1.0 - 102.0 / 1358.0)).abs() < 1e-12);
         // Measured: 51.2 degrees on average, most often 42.
         assert!((42.0..51.2).contains(&beta.to_degrees()), "{}", beta.to_degrees());
-        let arms = |beta: f64, zipped: f64| Arms::new([at(0.5 * beta), at(-0.5 * beta)], at(0.0) * zipped).unwrap();
+        let arms = |beta: f64, zipped: f64| {
+            Arms::new([at(0.5 * beta) * 30.0, at(-0.5 * beta) * 30.0], at(0.0) * zipped).unwrap()
+        };
         assert!(OLFACTORY.velocity(&arms(beta, -1.0)).norm() < 1e-9);
         assert!(OLFACTORY.velocity(&arms(1.2 * beta, -1.0)).x < 0.0);
         assert_eq!(OLFACTORY.velocity(&arms(1.2 * beta, 0.0)), Vector3::zeros());
@@ -119,8 +185,28 @@ mod tests {
     }
 
     #[test]
+    fn the_first_crossing_of_long_lines_is_that_of_all_pairs_of_their_segments() {
+        let wave = |turn: f64, count: usize| -> Vec<Vector3<f64>> {
+            (0..count).map(|i| Vector3::new(i as f64, 4.0 * (turn * i as f64).sin(), 0.0)).collect()
+        };
+        for turn in [0.11, 0.3, 0.47] {
+            let (a, b) = (wave(turn, 70), wave(0.23, 61));
+            let pairs = (0..69).flat_map(|i| (0..60).map(move |j| (i, j)));
+            let expected = pairs.into_iter().find_map(|(i, j)| {
+                segments_cross(&a[i..i + 2], &b[j..j + 2]).filter(|_| i > 0 || j > 0).map(|[s, t]| [(i, s), (j, t)])
+            });
+            let shifted = |line: &[Vector3<f64>]| line.to_vec();
+            let found = BoxedLine::new(shifted(&a)[1..].to_vec()).crossing(&BoxedLine::new(shifted(&b)[1..].to_vec()));
+            let expected = expected.map(|[(i, s), (j, t)]| [(i - 1, s), (j - 1, t)]);
+            assert_eq!(found, expected);
+            assert!(found.is_some());
+        }
+    }
+
+    #[test]
     fn a_crossing_is_found_where_lines_meet_and_none_where_they_do_not() {
-        let line = |points: &[[f64; 2]]| points.iter().map(|p| Vector3::new(p[0], p[1], 0.0)).collect::<Vec<_>>();
+        let line = |points: &[[f64; 2]]| BoxedLine::new(points.iter().map(|p| Vector3::new(p[0], p[1], 0.0)).collect());
+        let crossing = |a: &BoxedLine, b: &BoxedLine| a.crossing(b);
         let a = line(&[[0.0, 0.0], [4.0, 0.0], [4.0, 8.0]]);
         let b = line(&[[10.0, 6.0], [2.0, 2.0], [2.0, 10.0]]);
         assert_eq!(crossing(&a, &b), Some([(1, 0.375), (0, 0.75)]));

@@ -21,6 +21,8 @@ pub struct AxonRecord {
     pub arrival_time: Option<f64>,
     /// Whether it is a branch: its shaft counts, but arrivals, births and turning are those of axons.
     pub is_branch: bool,
+    /// Whether it has been drawn back for good: there is no shaft to measure.
+    pub is_withdrawn: bool,
     /// Heading at birth (any length but zero).
     pub initial_heading: [f64; 2],
     /// Heading now (any length but zero).
@@ -93,7 +95,7 @@ pub fn measure(axons: &[AxonRecord], options: &MeasureOptions) -> Morphology {
         hits_early: count_hits(early.into_iter()),
         hits_late: count_hits(late.into_iter()),
         travel_time_h: distribution(&trunks, |axon| Some(axon.arrival_time? - axon.birth_time)),
-        length_um: distribution(axons, |axon| Some(path_length(&axon.shaft))),
+        length_um: distribution(axons, |axon| Some(path_length(&axon.shaft)).filter(|_| !axon.is_withdrawn)),
         straightness: distribution(axons, |axon| straightness(&axon.shaft)),
         turning_angle_deg: distribution(&trunks, |axon| {
             turning_angle(axon.initial_heading, &axon.shaft).map(f64::to_degrees)
@@ -176,6 +178,7 @@ mod tests {
             birth_time,
             arrival_time,
             is_branch: false,
+            is_withdrawn: false,
             initial_heading: [0.0, 1.0],
             final_heading: end,
         }

@@ -122,12 +122,13 @@ pub fn axon_records(world: &World) -> Vec<AxonRecord> {
     }
     let born = cones.iter(world).filter(|(_, status, ..)| **status != Status::Unborn);
     born.zip(shafts(world))
-        .map(|((cone, _, journey, spring), shaft)| AxonRecord {
+        .map(|((cone, status, journey, spring), shaft)| AxonRecord {
             population: cone.population,
             shaft,
             birth_time: cone.birth_time,
             arrival_time: arrivals.get(&cone.axon).copied(),
             is_branch: spares.is_some_and(|spares| spares.is_branch(cone.axon)),
+            is_withdrawn: *status == Status::Withdrawn,
             initial_heading: [journey.first_heading[0], journey.first_heading[1]],
             final_heading: [spring.heading.x, spring.heading.y],
         })

@@ -153,7 +153,7 @@ fn a_fork_whose_branch_stands_holds_the_trunk_and_a_branch_that_goes_frees_it() 
         let fork = path(end.world(), 1)[0];
         let to_fork = (trunk.position.x - fork[0]).hypot(trunk.position.y - fork[1]);
         match (trunk.status, branch.status) {
-            (Status::Retracting, Status::Arrived) if to_fork < 1e-9 && fork[1] > 200.0 => trunks_held += 1,
+            (Status::Stalled, Status::Arrived) if to_fork < 1e-9 && fork[1] > 200.0 => trunks_held += 1,
             (Status::Arrived, Status::Withdrawn) => branches_gone += 1,
             other => panic!("{other:?}, {to_fork} um from the fork"),
         }
@@ -203,6 +203,27 @@ fn crossing_axons_zip_until_the_angle_of_balance() {
     // Where the shafts meet at more than the angle of balance nothing zips.
     let weak = shared(zipped(5.0, 10.0).world());
     assert!(weak.iter().all(|y| y.abs() < 1e-3), "{weak:?}");
+}
+
+/// Shafts that have stalled at the border zip, and are drawn back all the same: nothing is laid again that has been struck out.
+#[test]
+fn zipped_shafts_that_are_pruned_are_gone() {
+    let axons = [([480.0, 700.0], 80.0, 0.0), ([520.0, 700.0], 100.0, 0.0)];
+    let at_hour = |hours: f64| {
+        let blocks = json!({
+            "growth": { "on_border": "stall" },
+            "zippering": {},
+            "retraction": { "prune_after": 20, "speed": 50 }
+        });
+        ended(&scene(&axons, hours, 0.05, blocks), &roster())
+    };
+    let zipped = at_hour(19.0);
+    assert_eq!(zipped.world().resource::<Zippers>().angles(|_| Vector3::zeros()).len(), 1);
+    assert!(cones(zipped.world()).iter().all(|cone| cone.status == Status::Stalled));
+    let gone = at_hour(30.0);
+    assert!(cones(gone.world()).iter().all(|cone| cone.status == Status::Withdrawn));
+    assert!((0..2).all(|shaft| path(gone.world(), shaft).len() == 2));
+    assert!(gone.world().resource::<Zippers>().angles(|_| Vector3::zeros()).is_empty());
 }
 
 #[test]

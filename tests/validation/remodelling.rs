@@ -205,6 +205,46 @@ fn crossing_axons_zip_until_the_angle_of_balance() {
     assert!(weak.iter().all(|y| y.abs() < 1e-3), "{weak:?}");
 }
 
+type Ends = (Vec<(Status, u32)>, Vec<Vec<[f64; 2]>>, usize);
+
+/// Three axons under these blocks, with the places, headings (turned by so many degrees) and target given.
+fn remodelled(more: &Value, turn: f64, place: impl Fn([f64; 2]) -> [f64; 2], band: Value) -> Ends {
+    let axons = [([480.0, 300.0], 82.0), ([520.0, 300.0], 98.0), ([300.0, 350.0], 90.0)];
+    let axons: Vec<_> = axons.map(|(from, heading)| (place(from), heading + turn, 0.0)).to_vec();
+    let mut blocks = json!({ "targets": { "goal": { "polygon": { "points": band } } } });
+    more.as_object().unwrap().iter().for_each(|(name, block)| blocks[name] = block.clone());
+    // A step that divides the longest segment would leave it to round-off where vertices are stored.
+    let end = ended(&scene(&axons, 36.0, 0.0437, blocks), &roster());
+    let world = end.world();
+    let ends: Vec<_> = born(&cones(world)).iter().map(|cone| (cone.status, cone.identity.axon)).collect();
+    let shafts = ends.iter().map(|(_, number)| path(world, *number as usize)).collect();
+    let bonds = world.get_resource::<Zippers>().map_or(0, |zippers| zippers.angles(|_| Vector3::zeros()).len());
+    (ends, shafts, bonds)
+}
+
+/// The same turned by 90 degrees about the middle of the tissue.
+#[test]
+fn what_remodelling_does_does_not_depend_on_the_directions_of_the_axes() {
+    let branching = json!({
+        "branching": { "rate": 0.1, "most": 2, "angle": 150 },
+        "retraction": { "prune_after": 14, "speed": 60 }
+    });
+    for blocks in [branching, json!({ "zippering": { "arm": 10 } })] {
+        let upright = remodelled(&blocks, 0.0, |place| place, json!([[10, 550], [990, 550], [990, 600], [10, 600]]));
+        let band = json!([[450, 10], [450, 990], [400, 990], [400, 10]]);
+        let turned = remodelled(&blocks, 90.0, |[x, y]| [1000.0 - y, x], band);
+        assert_eq!((&upright.0, upright.2), (&turned.0, turned.2));
+        assert!(upright.2 > 0 || upright.0.iter().any(|(status, _)| *status == Status::Withdrawn), "{:?}", upright.0);
+        for (a, b) in upright.1.iter().zip(&turned.1) {
+            assert_eq!(a.len(), b.len());
+            for (place, other) in a.iter().zip(b) {
+                let apart = (1000.0 - place[1] - other[0]).hypot(place[0] - other[1]);
+                assert!(apart < 1e-6, "{place:?} {other:?}");
+            }
+        }
+    }
+}
+
 /// Shafts that have stalled at the border zip, and are drawn back all the same: nothing is laid again that has been struck out.
 #[test]
 fn zipped_shafts_that_are_pruned_are_gone() {

@@ -13,6 +13,8 @@
 //! which its instant falls (of first order in the step). Instants are those of the largest rate r, kept with probability g, so that cones
 //! with the same number branch at the same instants whatever else goes on.
 
+use super::cue_fields::Cues;
+use crate::numerics::turning::rotate_in_plane;
 use crate::prelude::*;
 
 keys! {
@@ -68,8 +70,7 @@ impl Mechanism for Branching {
     fn check(&self, facts: &Facts) -> Violations {
         let mut wrong = Violations::new();
         if let Some(cue) = &self.cue {
-            let known = facts.names_in("cues");
-            wrong.demand(known.contains(cue), "/cue", || unknown_name("cue", cue, &known));
+            Cues::demand_known(facts, &mut wrong, cue, "/cue");
         }
         wrong
     }
@@ -112,11 +113,6 @@ pub fn rate_factor(concentration: f64, half: f64) -> f64 {
 fn waiting_time(seed: u64, stream: Stream, (cone, count): (u32, u64), rate: f64) -> f64 {
     let share = KeyedRng::new(seed, cone, stream, 2 * count).share();
     if rate > 0.0 { -(-share).ln_1p() / rate } else { f64::INFINITY }
-}
-
-/// A vector turned by an angle (rad) about z, counter-clockwise.
-fn turned(vector: Vector3<f64>, angle: f64) -> Vector3<f64> {
-    Rotation3::from_axis_angle(&Vector3::z_axis(), angle) * vector
 }
 
 fn branch(
@@ -168,8 +164,8 @@ fn begin(
     let parent = cone.identity.axon;
     match kind {
         BranchKind::Splitting => {
-            let branch = remodelling.sprout(parent, Place::Tip, turned(cone.heading, 0.5 * angle))?;
-            cone.heading = turned(cone.heading, -0.5 * angle);
+            let branch = remodelling.sprout(parent, Place::Tip, rotate_in_plane(&cone.heading, 0.5 * angle))?;
+            cone.heading = rotate_in_plane(&cone.heading, -0.5 * angle);
             remodelling.head(parent, cone.heading);
             Some(branch)
         }
@@ -180,7 +176,7 @@ fn begin(
             let place = (share * inner.len() as f64) as usize;
             let at = |vertex: VertexId| remodelling.position(remodelling.shafts.point(vertex).into());
             let along = (at(inner[place]) - at(stored[place])).try_normalize(0.0)?;
-            remodelling.sprout(parent, Place::Vertex(inner[place]), turned(along, angle))
+            remodelling.sprout(parent, Place::Vertex(inner[place]), rotate_in_plane(&along, angle))
         }
     }
 }

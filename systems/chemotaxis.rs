@@ -115,10 +115,10 @@ impl Mechanism for Chemotaxis {
         }
         for (name, receptor) in &self.receptors {
             let at = format!("/receptors/{name}");
-            wrong.demand(cues.contains(name), &at, || unknown_name("cue", name, &cues));
+            Cues::demand_known(facts, &mut wrong, name, &at);
             for other in receptor.silenced_by.keys() {
                 let place = format!("{at}/silenced_by/{other}");
-                wrong.demand(cues.contains(other), &place, || unknown_name("cue", other, &cues));
+                Cues::demand_known(facts, &mut wrong, other, &place);
                 wrong.demand(other != name, &place, || "a receptor cannot be silenced by its own cue".into());
             }
             for population in receptor.populations.iter().filter(|p| !facts.populations.contains(p)) {

@@ -99,12 +99,9 @@ impl Mechanism for ConeRelease {
         wrong.demand(!self.cues.is_empty(), "/cues", || {
             "name what cones release, such as {\"attractant\": {\"effect\": \"attract\"}}".into()
         });
-        let known = facts.names_in(Cues::NAME);
         for (name, cue) in &self.cues {
             if let Some(activation) = &cue.activated_by {
-                wrong.demand(known.contains(&activation.cue), &format!("/cues/{name}/activated_by/cue"), || {
-                    unknown_name("cue", &activation.cue, &known)
-                });
+                Cues::demand_known(facts, &mut wrong, &activation.cue, &format!("/cues/{name}/activated_by/cue"));
             }
         }
         wrong

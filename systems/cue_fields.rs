@@ -69,6 +69,14 @@ impl Mechanism for Cues {
     }
 }
 
+impl Cues {
+    /// Demands that the scene has a cue, named at a place of a mechanism's block.
+    pub(super) fn demand_known(facts: &Facts, wrong: &mut Violations, cue: &str, pointer: &str) {
+        let known = facts.names_in(Self::NAME);
+        wrong.demand(known.iter().any(|name| name == cue), pointer, || unknown_name("cue", cue, &known));
+    }
+}
+
 /// Concentration and gradient of a cue at a place.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CueSample {

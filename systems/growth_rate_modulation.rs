@@ -38,8 +38,7 @@ impl Mechanism for GrowthRateModulation {
 
     fn check(&self, facts: &Facts) -> Violations {
         let mut wrong = Violations::new();
-        let cues = facts.names_in(Cues::NAME);
-        wrong.demand(cues.contains(&self.cue), "/cue", || unknown_name("cue", &self.cue, &cues));
+        Cues::demand_known(facts, &mut wrong, &self.cue, "/cue");
         wrong
     }
 

@@ -11,6 +11,7 @@
 //! draws back until it is gone (Luo and O'Leary, Annu. Rev. Neurosci. 28, 2005, doi:10.1146/annurev.neuro.28.061604.135632; the rule is ours).
 //! A fork whose branch still stands holds the cone, which stalls there: a trunk does not leave its branches behind.
 
+use super::cue_fields::Cues;
 use crate::prelude::*;
 
 keys! {
@@ -63,8 +64,7 @@ impl Mechanism for Retraction {
             "give `prune_after`, such as \"30 h\", or `collapse`, such as {\"cue\": \"repellent\"}; else nothing draws back".into()
         });
         if let Some(collapse) = &self.collapse {
-            let known = facts.names_in("cues");
-            wrong.demand(known.contains(&collapse.cue), "/collapse/cue", || unknown_name("cue", &collapse.cue, &known));
+            Cues::demand_known(facts, &mut wrong, &collapse.cue, "/collapse/cue");
         }
         wrong
     }

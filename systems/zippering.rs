@@ -11,9 +11,10 @@
 //! arms and the zipped part; that is the formula above, along the bisector, where they are alike. Mouse olfactory axons: T = 679 pN, S = 102 pN
 //! (52 to 186), β of 51° on average, 0.3 to 2 µm/min.
 //!
-//! Shafts zip once both have stopped growing, and let go when one begins to retract. A crossing opens into two points that move apart, on the sides where the shafts meet at less
-//! than 90°. Ours: an arm is pulled straight over `arm` of its length; a pair zips at its first crossing only; a crossing within `arm` of the
-//! end of a shaft, of a fork or of another zipper point is left alone, and zipper points stop there; drag of the zipped part is neglected.
+//! Shafts zip once both have stopped growing, and let go when one begins to retract. A crossing opens into two points
+//! that move apart, on the sides where the shafts meet at less than 90°. Ours: an arm is pulled straight over `arm` of its
+//! length; a pair zips at its first crossing only; a crossing within `arm` of the end of a shaft, of a fork or of another
+//! zipper point is left alone, and zipper points stop there; drag of the zipped part is neglected.
 
 use crate::numerics::zipper::{Arms, Balance, BoxedLine};
 use crate::prelude::*;
@@ -109,7 +110,10 @@ impl Mechanism for Zippering {
     }
 
     fn install(self, model: &mut ModelBuilder) -> Result<(), InstallError> {
-        model.insert(Zippers::default()).insert_law(self).phase(Phase::Remodel, zip);
+        if self.adhesion.0 > 0.0 {
+            model.phase(Phase::Remodel, zip);
+        }
+        model.insert(Zippers::default()).insert_law(self);
         Ok(())
     }
 }
@@ -117,9 +121,6 @@ impl Mechanism for Zippering {
 fn zip(law: Res<Law<Zippering>>, mut zippers: ResMut<Zippers>, mut remodelling: Remodelling) {
     let now = remodelling.clock.hours();
     let span = now - std::mem::replace(&mut zippers.last, now);
-    if law.adhesion.0 == 0.0 {
-        return;
-    }
     zippers.welcome(&law, &remodelling);
     let fastest = zippers.advance(&law, &remodelling, span);
     zippers.lay(&mut remodelling);

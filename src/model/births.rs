@@ -70,7 +70,28 @@ pub fn inner_normal(tissue: &Tissue, coordinates: &[[f64; 2]], facet: BorderFace
     Vector3::new(-along[1] / length, along[0] / length, 0.0)
 }
 
-type Newborn = (
+/// What may be altered of a cone.
+pub(super) struct Altered<'a> {
+    pub(super) status: &'a mut Status,
+    pub(super) site: &'a mut Site,
+    pub(super) position: &'a mut Position,
+    pub(super) velocity: &'a mut Velocity,
+    pub(super) spring: &'a mut SpringState,
+    pub(super) journey: &'a mut Journey,
+}
+
+impl Altered<'_> {
+    /// Begins at a site with its position (µm), with a unit heading and a speed (µm/h), at a time (h).
+    pub(super) fn begin(self, (site, position): (Site, Vector3<f64>), heading: Vector3<f64>, speed: f64, hours: f64) {
+        *self.status = Status::Growing;
+        (*self.site, self.position.0) = (site, position);
+        self.velocity.growth = heading * speed;
+        *self.spring = SpringState { heading, ..SpringState::default() };
+        (self.journey.first_heading, self.journey.ended) = (heading.into(), hours);
+    }
+}
+
+type Unborn = (
     &'static GrowthCone,
     &'static Origin,
     &'static mut Status,
@@ -90,7 +111,7 @@ pub fn give_birth(
     adaptive: Option<Res<AdaptiveSteps>>,
     mut queue: ResMut<BirthQueue>,
     mut shafts: ResMut<Shafts>,
-    mut cones: Query<Newborn, With<GrowthCone>>,
+    mut cones: Query<Unborn, With<GrowthCone>>,
 ) {
     let due = queue.take_before(clock.now + clock.next_step());
     if due.is_empty() {
@@ -108,13 +129,16 @@ pub fn give_birth(
             FirstHeading::InnerNormal(facet) => inner_normal(&tissue, &configuration.coordinates, facet),
             FirstHeading::Fixed(heading) => heading,
         };
-        status[i] = Status::Growing;
-        site[i] = origins[i].site;
-        position[i] = Position(configuration.position(&tissue.mesh, origins[i].site));
-        velocity[i].growth = heading * cones[i].speed;
-        spring[i] = SpringState { heading, ..SpringState::default() };
-        journey[i].first_heading = heading.into();
-        journey[i].ended = cones[i].birth_time;
+        let newborn = Altered {
+            status: &mut status[i],
+            site: &mut site[i],
+            position: &mut position[i],
+            velocity: &mut velocity[i],
+            spring: &mut spring[i],
+            journey: &mut journey[i],
+        };
+        let place = (origins[i].site, configuration.position(&tissue.mesh, origins[i].site));
+        newborn.begin(place, heading, cones[i].speed, cones[i].birth_time);
         if adaptive.is_none() {
             let at = tissue.reference_position(origins[i].site);
             shafts.start(i, origins[i].site, [at.x, at.y], cones[i].birth_time);

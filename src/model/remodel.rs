@@ -1,6 +1,7 @@
 //! What mechanisms of [`Phase::Remodel`](super::schedule::Phase::Remodel) may do to what is laid: let a branch sprout, draw a
 //! growth cone back along its shaft, lay a shaft anew. They act at the end of a step, on the state reached.
 
+use super::births::Altered;
 use super::clock::Clock;
 use super::components::{GrowthCone, Journey, Position, Site, SpringState, Status, Velocity};
 use super::shafts::{ShaftPoint, Shafts, VertexId};
@@ -108,17 +109,6 @@ type ConeParts = (
     &'static mut Journey,
 );
 
-/// A cone that is changed.
-struct Changed<'a> {
-    identity: &'a mut GrowthCone,
-    status: &'a mut Status,
-    site: &'a mut Site,
-    position: &'a mut Position,
-    velocity: &'a mut Velocity,
-    spring: &'a mut SpringState,
-    journey: &'a mut Journey,
-}
-
 /// Tissue, shafts and cones, to be remodelled.
 #[derive(SystemParam)]
 pub struct Remodelling<'w, 's> {
@@ -132,7 +122,7 @@ pub struct Remodelling<'w, 's> {
     pub shafts: ResMut<'w, Shafts>,
     /// Whether steps are to go on though nothing grows.
     pub unrest: ResMut<'w, Unrest>,
-    spares: Option<ResMut<'w, SpareCones>>,
+    spares: ResMut<'w, SpareCones>,
     cones: Query<'w, 's, ConeParts, With<GrowthCone>>,
 }
 
@@ -152,7 +142,7 @@ impl Remodelling<'_, '_> {
     }
 
     /// Lets `act` change one cone.
-    fn change(&mut self, cone: u32, act: impl FnOnce(Changed)) {
+    fn change(&mut self, cone: u32, act: impl FnOnce(&mut GrowthCone, Altered)) {
         let i = cone as usize;
         let Ok(mut tables) = self.cones.contiguous_iter_mut() else { return };
         let Some((mut identity, mut status, mut site, mut position, mut velocity, mut spring, mut journey)) =
@@ -161,15 +151,15 @@ impl Remodelling<'_, '_> {
             return;
         };
         if i < identity.len() {
-            act(Changed {
-                identity: &mut identity[i],
+            let cone = Altered {
                 status: &mut status[i],
                 site: &mut site[i],
                 position: &mut position[i],
                 velocity: &mut velocity[i],
                 spring: &mut spring[i],
                 journey: &mut journey[i],
-            });
+            };
+            act(&mut identity[i], cone);
         }
     }
 
@@ -186,7 +176,7 @@ impl Remodelling<'_, '_> {
             Place::Tip => (self.shafts.tip(parent).into(), hours as f32),
             Place::Vertex(vertex) => (self.shafts.point(vertex).into(), self.shafts.time(vertex)),
         };
-        let number = self.spares.as_mut()?.take(Fork { parent, time })?;
+        let number = self.spares.take(Fork { parent, time })?;
         if place == Place::Tip {
             let (stored, tip) = (self.shafts.vertices(parent as usize).count(), ShaftPoint { site, time });
             self.relay(parent, stored, &[tip], tip);
@@ -198,26 +188,22 @@ impl Remodelling<'_, '_> {
     fn start(&mut self, number: u32, site: Site, heading: Vector3<f64>) {
         let (now, hours, position) = (self.clock.now, self.clock.hours(), self.position(site));
         let at = self.tissue.reference_position(site);
-        self.change(number, |cone| {
-            (cone.identity.birth, cone.identity.birth_time) = (now, hours);
-            *cone.status = Status::Growing;
-            (*cone.site, cone.position.0) = (site, position);
-            cone.velocity.growth = heading * cone.identity.speed;
-            *cone.spring = SpringState { heading, ..SpringState::default() };
-            (cone.journey.first_heading, cone.journey.ended) = (heading.into(), hours);
+        self.change(number, |identity, cone| {
+            (identity.birth, identity.birth_time) = (now, hours);
+            cone.begin((site, position), heading, identity.speed, hours);
         });
         self.shafts.start(number as usize, site, [at.x, at.y], hours);
     }
 
     /// Turns the heading of a cone.
     pub fn head(&mut self, cone: u32, heading: Vector3<f64>) {
-        self.change(cone, |cone| cone.spring.heading = heading);
+        self.change(cone, |_, cone| cone.spring.heading = heading);
     }
 
     /// Says what a cone is doing from now on.
     pub fn set_status(&mut self, cone: u32, to: Status) {
         let now = self.clock.hours();
-        self.change(cone, |cone| (*cone.status, cone.journey.ended) = (to, now));
+        self.change(cone, |_, cone| (*cone.status, cone.journey.ended) = (to, now));
     }
 
     /// Draws a cone back along its shaft by `length` (µm, in the present configuration), to the origin or to the last fork that holds it
@@ -252,7 +238,7 @@ impl Remodelling<'_, '_> {
 
     /// Times (h) at which a cone passed the forks of its branches.
     pub fn fork_times(&self, cone: u32) -> Vec<f32> {
-        self.spares.iter().flat_map(|spares| spares.forks_of(cone)).map(|(_, time)| time).collect()
+        self.spares.forks_of(cone).map(|(_, time)| time).collect()
     }
 
     /// Points between two points of a shaft, on the straight line between them now, as many as keep its segments short enough.
@@ -275,7 +261,7 @@ impl Remodelling<'_, '_> {
 
     /// Whether a cone's axon has a cone left for a branch.
     pub fn may_branch(&self, cone: u32) -> bool {
-        self.spares.as_ref().is_some_and(|spares| spares.next(cone).is_some())
+        self.spares.next(cone).is_some()
     }
 
     /// Whether a cone has been drawn back to where it began.
@@ -286,11 +272,10 @@ impl Remodelling<'_, '_> {
 
     /// Time at which the cone passed the last fork whose branch still stands (h); before all time where there is none.
     fn hold(&self, cone: u32) -> f32 {
-        let Some(spares) = &self.spares else { return f32::NEG_INFINITY };
         let Ok(mut tables) = self.cones.contiguous_iter() else { return f32::NEG_INFINITY };
         let Some((_, statuses, ..)) = tables.next() else { return f32::NEG_INFINITY };
         let stands = |branch: &u32| statuses.get(*branch as usize).is_some_and(|status| *status != Status::Withdrawn);
-        let forks = spares.forks_of(cone).filter(|(branch, _)| stands(branch));
+        let forks = self.spares.forks_of(cone).filter(|(branch, _)| stands(branch));
         forks.map(|(_, time)| time).fold(f32::NEG_INFINITY, f32::max)
     }
 
@@ -317,7 +302,7 @@ impl Remodelling<'_, '_> {
     fn stand(&mut self, cone: u32, kept: usize, (site, time): (Site, f32), heading: Option<Vector3<f64>>) {
         self.relay(cone, kept, &[], ShaftPoint { site, time });
         let position = self.position(site);
-        self.change(cone, |cone| {
+        self.change(cone, |_, cone| {
             (*cone.site, cone.position.0) = (site, position);
             cone.velocity.growth = Vector3::zeros();
             cone.spring.heading = heading.unwrap_or(cone.spring.heading);

@@ -35,6 +35,11 @@ struct Chain {
     end: OpenEnd,
 }
 
+/// The bit of a vertex among those of its block.
+fn bit(vertex: VertexId) -> u16 {
+    1 << (vertex as usize % BLOCK)
+}
+
 /// All shafts of a run.
 #[derive(Debug, Clone, Resource)]
 pub struct Shafts {
@@ -52,6 +57,8 @@ pub struct Shafts {
     chains: Vec<Chain>,
     watched: bool,
     laid: Vec<VertexId>,
+    /// Of each block, a bit for each vertex that has been laid and not yet been taken as laid.
+    fresh: Vec<u16>,
     struck: Vec<Struck>,
 }
 
@@ -90,6 +97,7 @@ impl Shafts {
             chains: vec![empty; count],
             watched: false,
             laid: Vec::new(),
+            fresh: Vec::new(),
             struck: Vec::new(),
         }
     }
@@ -101,7 +109,7 @@ impl Shafts {
 
     /// Bytes that a stored vertex takes, with its share of a full block.
     pub fn bytes_a_vertex() -> f64 {
-        let block = size_of::<u8>() + 2 * size_of::<u32>();
+        let block = size_of::<u8>() + size_of::<u16>() + 3 * size_of::<u32>();
         (size_of::<u32>() + size_of::<f32>() + size_of::<[f64; 2]>()) as f64 + block as f64 / BLOCK as f64
     }
 
@@ -175,6 +183,7 @@ impl Shafts {
         self.used[block as usize] += 1;
         if self.watched {
             self.laid.push(place as VertexId);
+            self.fresh[block as usize] |= bit(place as VertexId);
         }
     }
 
@@ -184,6 +193,7 @@ impl Shafts {
         self.times.resize(self.times.len() + BLOCK, 0.0);
         self.weights.resize(self.weights.len() + BLOCK, [0.0; 2]);
         self.used.push(0);
+        self.fresh.push(0);
         self.next.push(NONE);
         self.owner.push(shaft as u32);
         let chain = &mut self.chains[shaft];
@@ -204,11 +214,22 @@ impl Shafts {
 
     /// Vertices stored since the last call, in the order they were laid: what a neighbour index has to add.
     pub fn take_laid(&mut self) -> Vec<VertexId> {
-        std::mem::take(&mut self.laid)
+        let mut laid = std::mem::take(&mut self.laid);
+        // Struck out since then, or laid, struck out and laid again: once is enough.
+        laid.retain(|&vertex| self.is_fresh_no_more(vertex));
+        laid
     }
 
-    /// Vertices struck out since the last call that had been taken as laid before: what a neighbour index has to forget, before it
-    /// adds what was laid.
+    /// Whether a vertex was fresh; it is not from now on.
+    fn is_fresh_no_more(&mut self, vertex: VertexId) -> bool {
+        let fresh = &mut self.fresh[vertex as usize / BLOCK];
+        let was = *fresh & bit(vertex) != 0;
+        *fresh &= !bit(vertex);
+        was
+    }
+
+    /// Vertices struck out since the last call that had been taken as laid before: what a neighbour index has to
+    /// forget, before it adds what was laid.
     pub fn take_struck(&mut self) -> Vec<Struck> {
         std::mem::take(&mut self.struck)
     }
@@ -243,10 +264,8 @@ impl Shafts {
             return;
         }
         let vertex = block * BLOCK as u32 + u32::from(self.used[block as usize]) - 1;
-        match self.laid.iter().rposition(|&laid| laid == vertex) {
-            Some(place) => drop(self.laid.remove(place)),
-            None if self.watched => self.struck.push(Struck { vertex, point: self.point(vertex) }),
-            None => {}
+        if self.watched && !self.is_fresh_no_more(vertex) {
+            self.struck.push(Struck { vertex, point: self.point(vertex) });
         }
         self.used[block as usize] -= 1;
         if self.used[block as usize] == 0 {

@@ -82,7 +82,8 @@ pub struct Morphology {
 
 /// Measures the axons born so far.
 pub fn measure(axons: &[AxonRecord], options: &MeasureOptions) -> Morphology {
-    let trunks: Vec<AxonRecord> = axons.iter().filter(|axon| !axon.is_branch).cloned().collect();
+    let all: Vec<&AxonRecord> = axons.iter().collect();
+    let trunks: Vec<&AxonRecord> = axons.iter().filter(|axon| !axon.is_branch).collect();
     let (early, late) = split_birth_window(&trunks);
     let shafts: Vec<Vec<[f64; 2]>> = axons.iter().map(|axon| axon.shaft.clone()).collect();
     let populations: Vec<u16> = axons.iter().map(|axon| axon.population).collect();
@@ -91,12 +92,12 @@ pub fn measure(axons: &[AxonRecord], options: &MeasureOptions) -> Morphology {
         measure_at_height(&shafts, &populations, height, options.linkage)
     };
     Morphology {
-        hits: count_hits(trunks.iter()),
-        hits_early: count_hits(early.into_iter()),
-        hits_late: count_hits(late.into_iter()),
+        hits: count_hits(&trunks),
+        hits_early: count_hits(&early),
+        hits_late: count_hits(&late),
         travel_time_h: distribution(&trunks, |axon| Some(axon.arrival_time? - axon.birth_time)),
-        length_um: distribution(axons, |axon| Some(path_length(&axon.shaft)).filter(|_| !axon.is_withdrawn)),
-        straightness: distribution(axons, |axon| straightness(&axon.shaft)),
+        length_um: distribution(&all, |axon| Some(path_length(&axon.shaft)).filter(|_| !axon.is_withdrawn)),
+        straightness: distribution(&all, |axon| straightness(&axon.shaft)),
         turning_angle_deg: distribution(&trunks, |axon| {
             turning_angle(axon.initial_heading, &axon.shaft).map(f64::to_degrees)
         }),
@@ -141,20 +142,19 @@ fn chord(path: &[[f64; 2]]) -> Option<[f64; 2]> {
 }
 
 /// Describes a quantity over the axons that have one; values that are not finite are left out.
-fn distribution(axons: &[AxonRecord], quantity: impl Fn(&AxonRecord) -> Option<f64>) -> Option<Distribution> {
-    let values: Vec<f64> = axons.iter().filter_map(quantity).filter(|value| value.is_finite()).collect();
+fn distribution(axons: &[&AxonRecord], quantity: impl Fn(&AxonRecord) -> Option<f64>) -> Option<Distribution> {
+    let values: Vec<f64> = axons.iter().filter_map(|axon| quantity(axon)).filter(|value| value.is_finite()).collect();
     Distribution::of(&values)
 }
 
 /// Counts arrivals.
-fn count_hits<'a>(axons: impl Iterator<Item = &'a AxonRecord>) -> Hits {
-    let (born, arrived) =
-        axons.fold((0, 0), |(born, arrived), axon| (born + 1, arrived + usize::from(axon.arrival_time.is_some())));
+fn count_hits(axons: &[&AxonRecord]) -> Hits {
+    let (born, arrived) = (axons.len(), axons.iter().filter(|axon| axon.arrival_time.is_some()).count());
     Hits { born, arrived, fraction: (born > 0).then(|| arrived as f64 / born as f64) }
 }
 
 /// The axons born before the middle of the birth window, and the others; two empty lists if the window has no length.
-fn split_birth_window(axons: &[AxonRecord]) -> (Vec<&AxonRecord>, Vec<&AxonRecord>) {
+fn split_birth_window<'a>(axons: &[&'a AxonRecord]) -> (Vec<&'a AxonRecord>, Vec<&'a AxonRecord>) {
     let times = || axons.iter().map(|axon| axon.birth_time);
     match (times().reduce(f64::min), times().reduce(f64::max)) {
         (Some(first), Some(last)) if first < last => {

@@ -90,7 +90,7 @@ pub fn shafts(world: &World) -> Vec<Vec<[f64; 2]>> {
 /// Tips of all axons born, in the order of the cones.
 pub fn tips(world: &World) -> Vec<TipView> {
     let (tissue, configuration) = (world.resource::<Tissue>(), world.resource::<Configuration>());
-    let spares = world.get_resource::<SpareCones>();
+    let spares = world.resource::<SpareCones>();
     let Some(mut cones) = world.try_query_filtered::<(&GrowthCone, &Status, &Site, &SpringState), With<GrowthCone>>()
     else {
         return Vec::new();
@@ -101,10 +101,24 @@ pub fn tips(world: &World) -> Vec<TipView> {
         .map(|(cone, status, site, spring)| {
             let x = configuration.position(&tissue.mesh, *site);
             let heading = [spring.heading.x, spring.heading.y];
-            let is_branch = spares.is_some_and(|spares| spares.is_branch(cone.axon));
+            let is_branch = spares.is_branch(cone.axon);
             TipView { axon: cone.axon, position: [x.x, x.y], heading, status: *status, is_branch }
         })
         .collect()
+}
+
+/// When the first growth cone of each axon arrived, its own or that of a branch (h).
+pub fn arrivals(world: &World) -> BTreeMap<u32, f64> {
+    let spares = world.resource::<SpareCones>();
+    let mut arrivals = BTreeMap::new();
+    let Some(mut cones) = world.try_query_filtered::<(&GrowthCone, &Status, &Journey), With<GrowthCone>>() else {
+        return arrivals;
+    };
+    for (cone, _, journey) in cones.iter(world).filter(|(_, status, _)| **status == Status::Arrived) {
+        let first = arrivals.entry(spares.root(cone.axon)).or_insert(journey.ended);
+        *first = journey.ended.min(*first);
+    }
+    arrivals
 }
 
 /// What measures need of every axon born.
@@ -114,12 +128,7 @@ pub fn axon_records(world: &World) -> Vec<AxonRecord> {
     else {
         return Vec::new();
     };
-    let spares = world.get_resource::<SpareCones>();
-    let mut arrivals = BTreeMap::new();
-    for (cone, _, journey, _) in cones.iter(world).filter(|(_, status, ..)| **status == Status::Arrived) {
-        let first = arrivals.entry(spares.map_or(cone.axon, |spares| spares.root(cone.axon))).or_insert(journey.ended);
-        *first = journey.ended.min(*first);
-    }
+    let (spares, arrivals) = (world.resource::<SpareCones>(), arrivals(world));
     let born = cones.iter(world).filter(|(_, status, ..)| **status != Status::Unborn);
     born.zip(shafts(world))
         .map(|((cone, status, journey, spring), shaft)| AxonRecord {
@@ -127,7 +136,7 @@ pub fn axon_records(world: &World) -> Vec<AxonRecord> {
             shaft,
             birth_time: cone.birth_time,
             arrival_time: arrivals.get(&cone.axon).copied(),
-            is_branch: spares.is_some_and(|spares| spares.is_branch(cone.axon)),
+            is_branch: spares.is_branch(cone.axon),
             is_withdrawn: *status == Status::Withdrawn,
             initial_heading: [journey.first_heading[0], journey.first_heading[1]],
             final_heading: [spring.heading.x, spring.heading.y],

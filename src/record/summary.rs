@@ -1,20 +1,19 @@
 //! `summary.json`: what came out, and what it cost.
 
 use super::measures::{MeasureOptions, Morphology, measure};
-use super::snapshot::{TipView, axon_records, extent_in_y, tips};
+use super::snapshot::{arrivals, axon_records, extent_in_y, tips};
 use crate::model::clock::Clock;
 use crate::model::components::{GrowthCone, Journey, Status};
 use crate::model::growth::{Growth, Populations, Targets};
 use crate::model::health::{Counters, Fault, Health};
 use crate::model::plan::Plan;
-use crate::model::remodel::SpareCones;
 use crate::model::shafts::Shafts;
 use crate::model::stopwatch::Stopwatch;
 use crate::model::tissue::{Configuration, Tissue};
 use crate::numerics::turning::derived;
 use bevy_ecs::prelude::{With, World};
 use serde::Serialize;
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 /// How many axons are in which state.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
@@ -167,16 +166,13 @@ fn morphology(world: &World, options: &MeasureOptions) -> Morphology {
 fn counts(world: &World) -> Counts {
     let axons = world.resource::<Populations>().0.iter().map(|population| population.count).sum();
     let mut counts = Counts { axons, ..Counts::default() };
-    let tips = tips(world);
-    let root = |axon: u32| world.get_resource::<SpareCones>().map_or(axon, |spares| spares.root(axon));
-    let arrived = |tip: &&TipView| tip.status == Status::Arrived;
-    let arrived: BTreeSet<u32> = tips.iter().filter(arrived).map(|tip| root(tip.axon)).collect();
-    for tip in tips {
+    let arrivals = arrivals(world);
+    for tip in tips(world) {
         if tip.is_branch {
             counts.branches += 1;
             continue;
         }
-        match if arrived.contains(&tip.axon) { Status::Arrived } else { tip.status } {
+        match if arrivals.contains_key(&tip.axon) { Status::Arrived } else { tip.status } {
             Status::Unborn => {}
             Status::Growing => counts.growing += 1,
             Status::Arrived => counts.arrived += 1,

@@ -63,9 +63,7 @@ pub(super) fn spawn_cones(world: &mut World, scene: &Scene, spares: u32) -> Resu
     world.insert_resource(Populations(list));
     let births: Vec<u64> = cones.iter().filter_map(|&cone| world.get::<GrowthCone>(cone)).map(|c| c.birth).collect();
     world.insert_resource(BirthQueue::new(births.into_iter()));
-    if spares > 0 {
-        spawn_spares(world, &mut cones, &mut of_shaft, spares);
-    }
+    spawn_spares(world, &mut cones, &mut of_shaft, spares);
     world.insert_resource(ShaftPopulations(of_shaft));
     world.insert_resource(Shafts::new(cones.len(), SHAFT_TOLERANCE, LONGEST_SEGMENT));
     Ok(cones)

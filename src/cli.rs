@@ -12,6 +12,7 @@ use crate::scenario::load::{Loaded, Request};
 use crate::scenario::schema::top_keys;
 use crate::study::ablation::{self, Extent};
 use crate::study::accuracy;
+use crate::study::bench;
 use crate::study::chart;
 use crate::study::laboratory::Laboratory;
 use crate::study::plan::plan;
@@ -96,6 +97,23 @@ enum Command {
         #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1024))]
         threads: Option<u32>,
     },
+    /// Times a scene that scales by the key parameters/axons, beside a plain loop over arrays of the same mathematics
+    Bench {
+        #[command(flatten)]
+        scene: SceneArguments,
+        /// Folder of the results [default: out/<scene>-bench]
+        #[arg(long, value_name = "DIR")]
+        out: Option<PathBuf>,
+        /// Numbers of axons
+        #[arg(long, value_name = "N,N,…", value_delimiter = ',', default_values_t = [1000, 10_000, 100_000], value_parser = clap::value_parser!(u64).range(1..=100_000_000))]
+        axons: Vec<u64>,
+        /// How often each is timed, up to 50 000 axons
+        #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..=1000))]
+        repetitions: u32,
+        /// Threads of the simulation; the plain loop has one
+        #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=1024))]
+        threads: u32,
+    },
     /// Maps where methods fail, and what the program then does: numbers and a figure a map
     Stability {
         /// Folder of the results
@@ -167,6 +185,7 @@ const EXAMPLES: &str = "Examples:
   tropism plan scenarios/olfactory.json                  what it needs, before it runs
   tropism ablate scenarios/olfactory.json --seeds 4      without each mechanism in turn
   tropism chart scenarios/olfactory.json --only cue_field  error against time
+  tropism bench scenarios/load.json --axons 1000,10000   growth cones a second
   tropism stability                                      where methods fail, into out/stability
   tropism mechanisms fasciculation                       its equation and its keys
   tropism schema > scene.schema.json                     for editors; a scene says \"$schema\": \"scene.schema.json\"
@@ -203,6 +222,7 @@ fn on_threads<T: Send>(cli: &Cli, work: impl FnOnce() -> Result<T, RunError> + S
         Some(Command::Plan { threads, .. } | Command::Chart { threads, .. } | Command::Ablate { threads, .. }) => {
             *threads
         }
+        Some(Command::Bench { threads, .. }) => Some(*threads),
         _ => None,
     };
     let threads = own.or(cli.threads).unwrap_or(0) as usize;
@@ -224,6 +244,11 @@ fn execute(cli: &Cli, roster: &Roster) -> Result<ExitCode, RunError> {
             let laboratory =
                 Laboratory { request: &request, roster, repetitions: *repetitions as usize, seeds: *seeds };
             return run_chart(&laboratory, out.as_ref(), only);
+        }
+        Some(Command::Bench { scene, out, axons, repetitions, .. }) => {
+            let (request, _) = scene.settled(roster)?;
+            let laboratory = Laboratory { request: &request, roster, repetitions: *repetitions as usize, seeds: 1 };
+            return run_bench(&laboratory, out.as_ref(), axons);
         }
         Some(Command::Stability { out }) => return run_stability(out, roster),
         Some(Command::Mechanisms { name, json }) => return list_mechanisms(name.as_deref(), *json, roster),
@@ -326,6 +351,18 @@ fn run_chart(laboratory: &Laboratory, out: Option<&PathBuf>, only: &[String]) ->
             }
         }
     }
+    say!("results in {}", folder.display());
+    Ok(ExitCode::SUCCESS)
+}
+
+fn run_bench(laboratory: &Laboratory, out: Option<&PathBuf>, axons: &[u64]) -> Result<ExitCode, RunError> {
+    let folder = folder_of(out, &format!("{}-bench", laboratory.scene()?.scene.name));
+    prepare_folder(&folder)?;
+    let bar = progress_bar();
+    let found = bench::bench(laboratory, axons, &|share| bar.set_position((share * 1000.0) as u64))?;
+    bar.finish_and_clear();
+    bench::report::write(&folder, &found)?;
+    say!("{}", found.to_string().trim_end());
     say!("results in {}", folder.display());
     Ok(ExitCode::SUCCESS)
 }

@@ -41,7 +41,7 @@ keys! {
         /// Adhesion h between populations, row (who feels) by column (who is felt); 1 where nothing is given. Ours.
         pub adhesion: BTreeMap<String, BTreeMap<String, Factor>> = BTreeMap::new(),
         /// How shafts near a cone are found. Ours.
-        pub neighbours: Search = Search::Tree,
+        pub neighbours: Search = Search::Grid,
     }
 }
 

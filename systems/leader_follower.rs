@@ -64,7 +64,7 @@ impl Mechanism for LeaderFollower {
         for name in self.regions.keys() {
             tissue.regions.get(&region(name)).into_iter().flatten().for_each(|&cell| cells[cell as usize] = true);
         }
-        let followed = ShaftIndex::install(model, self.reach.0, Search::Tree);
+        let followed = ShaftIndex::install(model, self.reach.0, Search::default());
         model.insert(DecisionCells(cells)).insert_law(self);
         if followed {
             model.term(Term::Contact, slow_leaders);

@@ -1,32 +1,34 @@
-//! Provider: what lies near a growth cone, from an R-tree over the shafts.
+//! Provider: what lies near a growth cone.
 //!
-//! The tree lives in the *reference* configuration, where stored vertices never move, so that it only ever grows. Each
+//! Shafts are indexed in the *reference* configuration, where stored vertices never move, so that the index only ever grows. Each
 //! shaft segment stands in it as its first vertex; a segment is at most `Shafts::longest` long, so a ball of radius
 //! r‖F⁻¹‖ + longest about a cone holds the first vertices of all segments within the spatial distance r. Segments that
 //! end at a live tip need no entry of their own: their end is looked up.
 //!
-//! The tree is not asked every step. Cones that sit in one square of a coarse grid share a list of candidates, which is asked
-//! of the tree when the first cone enters the square, kept up to date as vertices are laid, and dropped when the last cone
-//! has gone. A list names blocks of stored vertices, with a bit for each vertex that may be near. Lists hold more than is near
-//! and are sorted; what is not within reach adds exactly nothing, so results are those of looking at every segment of every
-//! shaft, to the last bit.
+//! Cones that sit in one square of a coarse grid share a list of candidates. With `grid`, every vertex is put into the lists of all
+//! squares near it as it is laid. With `tree`, it is put into an R-tree, which is asked when the first cone enters a square, and
+//! into the lists that there are. A list names blocks of stored vertices, with a bit for each vertex that may be near. Lists hold
+//! more than is near and are sorted; what is not within reach adds exactly nothing, so results are those of looking at every segment of
+//! every shaft, to the last bit.
+
+mod places;
+mod squares;
 
 use crate::model::births::Origin;
 use crate::model::shafts::{BLOCK, Struck};
 use crate::numerics::contact_integral::Felt;
 use crate::numerics::locate::MaterialPoint;
-use crate::numerics::polylines::{Part, Polyline, meeting};
+use crate::numerics::polylines::{Part, meeting};
 use crate::numerics::segments::{ContactPull, Contacts, Segments};
 use crate::prelude::*;
 use nalgebra::Vector2;
+use places::{BYTES_A_BLOCK, Line, Places};
 use rayon::prelude::*;
 use rstar::primitives::GeomWithData;
 use rstar::{AABB, RTree, RTreeNode};
-use std::collections::HashMap;
-use std::sync::{Mutex, PoisonError};
+use squares::{Listed, Square, Squares, corners, name, part_of, parts_near, square, squares_near, unname};
 
 type Entry = GeomWithData<[f64; 2], VertexId>;
-type Square = [i32; 2];
 const _: () = assert!(BLOCK == u16::BITS as usize);
 
 /// The part of the plan that the index is.
@@ -35,35 +37,17 @@ const PART: &str = "shaft index";
 const SIDE: f64 = 3.0;
 /// Room for ‖F⁻¹‖ to grow before lists are made anew.
 const ROOM: f64 = 1.05;
-/// Cones of a square that one task serves: few enough to spread a crowded square over threads.
-const SHARED: usize = 32;
-
-/// Work memory that tasks take and give back: one for each that runs at the same time.
-struct Pool<T>(Mutex<Vec<T>>);
-
-impl<T> Default for Pool<T> {
-    fn default() -> Self {
-        Self(Mutex::new(Vec::new()))
-    }
-}
-
-impl<T: Default> Pool<T> {
-    fn lend<R>(&self, work: impl FnOnce(&mut T) -> R) -> R {
-        let lock = || self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        let taken = lock().pop();
-        let mut memory = taken.unwrap_or_default();
-        let result = work(&mut memory);
-        lock().push(memory);
-        result
-    }
-}
+/// Cones that one task serves: few enough to spread a crowded square over threads.
+const TASK: usize = 32;
 
 /// How the shafts near a growth cone are found. Results do not depend on it, to the last bit.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Search {
-    /// By an R-tree.
+    /// By a grid that every piece of a shaft is put into as it is laid.
     #[default]
+    Grid,
+    /// By an R-tree that is asked where cones come.
     Tree,
     /// By looking at every segment of every shaft: slow, and there to be compared with.
     All,
@@ -111,6 +95,22 @@ impl Asking {
     }
 }
 
+/// Where a cone that asks sits.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+struct Seat {
+    square: Square,
+    /// Its place among those that ask.
+    cone: u32,
+    /// The bit of the part of the square.
+    part: u16,
+}
+
+impl Seat {
+    fn shares_square(&self, other: &Self) -> bool {
+        self.square == other.square
+    }
+}
+
 /// The neighbour index over all shaft segments.
 #[derive(Debug, Resource, Default)]
 pub struct ShaftIndex {
@@ -118,52 +118,9 @@ pub struct ShaftIndex {
     search: Search,
     reach: f64,
     radius: f64,
-    lists: HashMap<Square, Vec<Part>>,
+    squares: Squares,
+    everything: Vec<Listed>,
     places: Places,
-}
-
-/// Positions now (µm) of a block's vertices, and of the point that the last of them leads to.
-type Line = Polyline<{ BLOCK + 1 }>;
-
-/// Polylines of the blocks that some list names, each found once for all squares.
-#[derive(Debug, Default)]
-struct Places {
-    positions: Vec<Line>,
-    /// For each block, one more than the revision of the configuration it was found in; 0 when not yet, or when it still grows.
-    revisions: Vec<u64>,
-    stale: Vec<bool>,
-}
-
-impl Places {
-    /// Finds the blocks of all lists.
-    fn bring_up_to_date<'a>(&mut self, scene: &ShaftScene, listed: impl Iterator<Item = &'a Part>) {
-        let (now, blocks) = (scene.configuration.revision + 1, scene.shafts.block_count());
-        self.positions.resize(blocks, [[0.0; BLOCK + 1]; 2]);
-        self.revisions.resize(blocks, 0);
-        self.stale.resize(blocks, false);
-        for &(block, _) in listed {
-            self.stale[block as usize] = self.revisions[block as usize] != now;
-        }
-        let blocks = self.positions.par_iter_mut().zip(&mut self.revisions).zip(&mut self.stale).enumerate();
-        blocks.with_min_len(64).filter(|(_, (_, stale))| **stale).for_each(
-            |(block, ((positions, revision), stale))| {
-                *positions = scene.polyline(block as u32);
-                *revision = if scene.shafts.block_after(block as u32).is_some() { now } else { 0 };
-                *stale = false;
-            },
-        );
-    }
-}
-
-impl Places {
-    /// Forgets where a block and the one before it were, whose end it may have been.
-    fn forget(&mut self, block: u32, shafts: &Shafts) {
-        for block in [Some(block), shafts.block_before(block)].into_iter().flatten() {
-            if let Some(revision) = self.revisions.get_mut(block as usize) {
-                *revision = 0;
-            }
-        }
-    }
 }
 
 impl ShaftIndex {
@@ -180,10 +137,10 @@ impl ShaftIndex {
         match model.world.get_resource_mut::<ShaftIndex>() {
             Some(mut index) => {
                 index.reach = index.reach.max(reach);
-                index.search = if search == Search::All { search } else { index.search };
+                index.search = index.search.max(search);
             }
             None => {
-                tell(model, reach);
+                tell(model, reach, search);
                 model.world.resource_mut::<Shafts>().watch();
                 model.insert(ShaftIndex { search, reach, ..ShaftIndex::default() });
                 model.phase(Phase::Neighbours, index_new_vertices);
@@ -201,82 +158,113 @@ impl ShaftIndex {
         cones: &[Asking],
         act: impl Fn(&mut S, &Asking, &Segments<2>) -> T + Sync,
     ) -> Vec<T> {
-        let side = SIDE * self.reach;
-        let mut order: Vec<(Square, u32)> =
-            cones.iter().zip(0..).map(|(cone, i)| (square(scene.reference(cone.site), side), i)).collect();
-        order.sort_unstable();
+        let side = self.side();
+        let seat = |(cone, i): (&Asking, u32)| {
+            let at = scene.reference(cone.site);
+            Seat { square: square(at, side), part: part_of(at, side), cone: i }
+        };
+        let mut order: Vec<Seat> = cones.par_iter().zip(0..cones.len() as u32).map(seat).collect();
+        order.par_sort_unstable();
         self.prepare(scene, &order);
-        let groups: Vec<&[(Square, u32)]> = order.chunk_by(|a, b| a.0 == b.0).collect();
-        let (columns, workplaces) = (Pool::<(Segments<2>, Vec<Part>)>::default(), Pool::<S>::default());
-        let serve = |segments: &Segments<2>, part: &[(Square, u32)]| -> Vec<(u32, T)> {
-            let each = |work: &mut S| part.iter().map(|&(_, i)| (i, act(work, &cones[i as usize], segments))).collect();
-            workplaces.lend(each)
+        let serve = |(segments, parts, work): &mut (Segments<2>, Vec<Part>, S), task: &[Seat]| -> Vec<_> {
+            let mut found = Vec::with_capacity(task.len());
+            for group in task.chunk_by(Seat::shares_square) {
+                self.gather(scene, group, cones, (segments, parts));
+                found.extend(group.iter().map(|seat| (seat.cone, act(work, &cones[seat.cone as usize], segments))));
+            }
+            found
         };
-        let serve_group = |group: &&[(Square, u32)]| -> Vec<(u32, T)> {
-            columns.lend(|columns| {
-                self.gather(scene, group, cones, columns);
-                let segments = &columns.0;
-                group.par_chunks(SHARED).with_max_len(1).map(|part| serve(segments, part)).flatten_iter().collect()
-            })
-        };
-        let mut found: Vec<(u32, T)> = groups.par_iter().with_max_len(1).map(serve_group).flatten_iter().collect();
-        found.sort_unstable_by_key(|(i, _)| *i);
-        found.into_iter().map(|(_, value)| value).collect()
+        let tasks: Vec<Vec<(u32, T)>> = order.par_chunks(TASK).map_init(Default::default, serve).collect();
+        let mut found: Vec<Option<T>> = std::iter::repeat_with(|| None).take(cones.len()).collect();
+        tasks.into_iter().flatten().for_each(|(i, value)| found[i as usize] = Some(value));
+        found.into_iter().flatten().collect()
     }
 
-    /// Makes sure that there is a valid list for each square in use, and for no other.
-    fn prepare(&mut self, scene: &ShaftScene, order: &[(Square, u32)]) {
+    /// Side of a square (µm, reference).
+    fn side(&self) -> f64 {
+        SIDE * self.reach
+    }
+
+    /// Makes sure that there is a valid list for each square in use.
+    fn prepare(&mut self, scene: &ShaftScene, order: &[Seat]) {
         let needed = self.reach * scene.configuration.inverse_stretch(&scene.tissue.mesh);
         if needed > self.radius {
             self.radius = needed * if scene.configuration.moves { ROOM } else { 1.0 };
-            self.lists.clear();
+            self.begin_anew(scene);
         }
-        if self.search == Search::All {
-            return self.name_everything(scene, order);
+        match self.search {
+            Search::All => self.list_everything(scene),
+            Search::Tree => self.ask_for_missing(order, scene.shafts.longest),
+            Search::Grid => {}
         }
-        self.lists.retain(|square, _| order.binary_search_by_key(square, |(other, _)| *other).is_ok());
-        let mut missing: Vec<Square> = order.iter().map(|(square, _)| *square).collect();
-        missing.dedup();
-        missing.retain(|square| !self.lists.contains_key(square));
-        let margin = self.radius + scene.shafts.longest;
-        let side = SIDE * self.reach;
-        let made: Vec<_> = missing.into_par_iter().map(|at| (at, ask(&self.tree, at, side, margin))).collect();
-        self.lists.extend(made);
-        self.places.bring_up_to_date(scene, self.lists.values().flatten());
+        let mut places = std::mem::take(&mut self.places);
+        places.find(scene, order.chunk_by(Seat::shares_square).flat_map(|group| self.near(group)));
+        self.places = places;
     }
 
-    /// One list of all vertices for each square in use: no cone is spared anything.
-    fn name_everything(&mut self, scene: &ShaftScene, order: &[(Square, u32)]) {
+    /// What may be near some cones in one square.
+    fn near(&self, group: &[Seat]) -> impl Iterator<Item = Part> + '_ {
+        let list = match self.search {
+            Search::All => &self.everything,
+            Search::Grid | Search::Tree => self.squares.get(group[0].square).unwrap_or_default(),
+        };
+        let parts = group.iter().fold(0, |parts, seat| parts | seat.part);
+        list.iter().filter(move |listed| listed.parts & parts != 0).map(|listed| (listed.block, listed.vertices))
+    }
+
+    /// One list of all vertices: no cone is spared anything.
+    fn list_everything(&mut self, scene: &ShaftScene) {
         let all = |used: usize| if used == BLOCK { u16::MAX } else { (1 << used) - 1 };
-        let blocks = 0..scene.shafts.block_count() as u32;
-        let list: Vec<Part> = blocks.map(|block| (block, all(scene.shafts.block_vertices(block).len()))).collect();
-        self.places.bring_up_to_date(scene, list.iter());
-        self.lists = order.chunk_by(|a, b| a.0 == b.0).map(|group| (group[0].0, list.clone())).collect();
+        let listed = |block| {
+            let vertices = all(scene.shafts.block_vertices(block).len());
+            Listed { block, vertices, parts: u16::MAX }
+        };
+        self.everything = (0..scene.shafts.block_count() as u32).map(listed).collect();
+    }
+
+    /// Makes lists for another radius.
+    fn begin_anew(&mut self, scene: &ShaftScene) {
+        self.squares.clear();
+        if self.search == Search::Grid {
+            let shafts = &scene.shafts;
+            for vertex in (0..shafts.block_count() as u32).flat_map(|block| shafts.block_vertices(block)) {
+                self.put((vertex, scene.reference(shafts.point(vertex).into())), shafts.longest);
+            }
+        }
+    }
+
+    /// Asks the tree for the lists of squares that cones have come to.
+    fn ask_for_missing(&mut self, order: &[Seat], longest: f64) {
+        let (side, margin) = (self.side(), self.radius + longest);
+        let groups: Vec<Square> = order.chunk_by(Seat::shares_square).map(|group| group[0].square).collect();
+        let missing = groups.into_par_iter().filter(|&square| self.squares.get(square).is_none());
+        let made: Vec<_> = missing.map(|square| (square, ask(&self.tree, square, margin, side))).collect();
+        made.into_iter().for_each(|(square, list)| *self.squares.make(square) = list);
     }
 
     /// The segments of a square's list that come near any cone of a group.
     fn gather(
         &self,
         scene: &ShaftScene,
-        group: &[(Square, u32)],
+        group: &[Seat],
         cones: &[Asking],
-        columns: &mut (Segments<2>, Vec<Part>),
+        (segments, met): (&mut Segments<2>, &mut Vec<Part>),
     ) {
-        let positions = || group.iter().map(|(_, i)| cones[*i as usize].position.xy());
+        let positions = || group.iter().map(|seat| cones[seat.cone as usize].position.xy());
         let low = positions().fold(Vector2::repeat(f64::INFINITY), |m, x| m.inf(&x)).add_scalar(-self.reach);
         let high = positions().fold(Vector2::repeat(f64::NEG_INFINITY), |m, x| m.sup(&x)).add_scalar(self.reach);
-        let list = &self.lists[&group[0].0];
-        let (segments, met) = columns;
+        let near = self.near(group).map(|(block, vertices)| (self.places.number(block), vertices));
         segments.clear();
-        let near = match self.search {
-            Search::All => list,
-            Search::Tree => {
-                meeting(&self.places.positions, list, [low, high], met);
-                &*met
+        match self.search {
+            Search::All => {
+                met.clear();
+                met.extend(near);
             }
-        };
-        for &(block, vertices) in near {
-            let ([x, y], owner) = (&self.places.positions[block as usize], scene.shafts.block_owner(block));
+            Search::Grid | Search::Tree => meeting(self.places.lines(), near, [low, high], met),
+        }
+        for &(number, vertices) in met.iter() {
+            let [x, y] = &self.places.lines()[number as usize];
+            let owner = scene.shafts.block_owner(self.places.block(number));
             let kind = u32::from(scene.populations.0[owner as usize]);
             let mut rest = vertices;
             while rest != 0 {
@@ -288,38 +276,52 @@ impl ShaftIndex {
     }
 
     fn add(&mut self, vertex: VertexId, at: [f64; 2], longest: f64) {
-        self.tree.insert(Entry::new(at, vertex));
-        self.each_list_near(at, longest, |list| name(list, vertex));
+        match self.search {
+            Search::All => {}
+            Search::Grid => self.put((vertex, at), longest),
+            Search::Tree => {
+                self.tree.insert(Entry::new(at, vertex));
+                for (square, parts) in squares_near(at, self.radius + longest, self.side()) {
+                    if let Some(list) = self.squares.get_mut(square) {
+                        name(list, vertex, parts);
+                    }
+                }
+            }
+        }
+    }
+
+    /// Puts a vertex at a reference position (µm) into the lists of all squares that it may be near to.
+    fn put(&mut self, (vertex, at): (VertexId, [f64; 2]), longest: f64) {
+        for (square, parts) in squares_near(at, self.radius + longest, self.side()) {
+            name(self.squares.make(square), vertex, parts);
+        }
     }
 
     fn forget(&mut self, vertex: VertexId, at: [f64; 2], longest: f64) {
-        self.tree.remove(&Entry::new(at, vertex));
-        self.each_list_near(at, longest, |list| unname(list, vertex));
-    }
-
-    /// The lists of all squares that a vertex with reference position `at` may be near to.
-    fn each_list_near(&mut self, at: [f64; 2], longest: f64, mut act: impl FnMut(&mut Vec<Part>)) {
-        let side = SIDE * self.reach;
-        let margin = self.radius + longest;
-        let low = square(Vector3::new(at[0] - margin, at[1] - margin, 0.0), side);
-        let high = square(Vector3::new(at[0] + margin, at[1] + margin, 0.0), side);
-        for x in low[0]..=high[0] {
-            for y in low[1]..=high[1] {
-                if let Some(list) = self.lists.get_mut(&[x, y]) {
-                    act(list);
-                }
+        if self.search == Search::Tree {
+            self.tree.remove(&Entry::new(at, vertex));
+        }
+        for (square, _) in squares_near(at, self.radius + longest, self.side()) {
+            if let Some(list) = self.squares.get_mut(square) {
+                unname(list, vertex);
             }
         }
     }
 }
 
+/// Parts of lists that a stored vertex takes, with the room in them. Ours, measured.
+const LISTED: f64 = 4.0;
 /// Room in the nodes of the tree over what stands in them. Ours, measured.
 const SLACK: f64 = 1.5;
 
 /// Says what the index holds and what looking `reach` far (µm) costs.
-fn tell(model: &mut ModelBuilder, reach: f64) {
-    let block = size_of::<Line>() + size_of::<u64>() + size_of::<bool>();
-    let bytes = SLACK * size_of::<RTreeNode<Entry>>() as f64 + block as f64 / BLOCK as f64;
+fn tell(model: &mut ModelBuilder, reach: f64, search: Search) {
+    let entries = match search {
+        Search::All => 0.0,
+        Search::Grid => LISTED * size_of::<Listed>() as f64,
+        Search::Tree => SLACK * size_of::<RTreeNode<Entry>>() as f64,
+    };
+    let bytes = entries + BYTES_A_BLOCK as f64 / BLOCK as f64;
     let looked_at = if model.world.resource::<Configuration>().moves {
         model.world.resource::<Tissue>().mesh.cell_count() as f64
     } else {
@@ -349,39 +351,21 @@ fn evenly_spread(world: &mut World, reach: f64) -> f64 {
     0.5 * shafts.count() as f64 / width * (2.0 * reach).powi(2) / shafts.mean_segment()
 }
 
-/// Puts a vertex into a list.
-fn name(list: &mut Vec<Part>, vertex: VertexId) {
-    let (block, bit) = (vertex / BLOCK as u32, 1 << (vertex as usize % BLOCK));
-    match list.binary_search_by_key(&block, |(other, _)| *other) {
-        Ok(at) => list[at].1 |= bit,
-        Err(at) => list.insert(at, (block, bit)),
-    }
-}
-
-/// Takes a vertex out of a list.
-fn unname(list: &mut Vec<Part>, vertex: VertexId) {
-    let (block, bit) = (vertex / BLOCK as u32, 1 << (vertex as usize % BLOCK));
-    if let Ok(at) = list.binary_search_by_key(&block, |(other, _)| *other) {
-        list[at].1 &= !bit;
-        if list[at].1 == 0 {
-            list.remove(at);
+/// All vertices within a margin of a square, ascending.
+fn ask(tree: &RTree<Entry>, square: Square, margin: f64, side: f64) -> Vec<Listed> {
+    let [low, high] = corners(square, side);
+    let envelope = AABB::from_corners(low.map(|x| x - margin), high.map(|x| x + margin));
+    let mut near: Vec<_> =
+        tree.locate_in_envelope_intersecting(envelope).map(|entry| (entry.data, *entry.geom())).collect();
+    near.sort_unstable_by_key(|(vertex, _)| *vertex);
+    let mut list = Vec::new();
+    for (vertex, at) in near {
+        // Those in the corners of the envelope are near to no part.
+        match parts_near(low, at, margin, side) {
+            0 => {}
+            parts => name(&mut list, vertex, parts),
         }
     }
-}
-
-fn square(x: Vector3<f64>, side: f64) -> Square {
-    [(x.x / side).floor() as i32, (x.y / side).floor() as i32]
-}
-
-/// All vertices within a margin of a square, ascending.
-fn ask(tree: &RTree<Entry>, [x, y]: Square, side: f64, margin: f64) -> Vec<Part> {
-    let low = [f64::from(x) * side - margin, f64::from(y) * side - margin];
-    let high = [f64::from(x + 1) * side + margin, f64::from(y + 1) * side + margin];
-    let near = tree.locate_in_envelope_intersecting(AABB::from_corners(low, high));
-    let mut vertices: Vec<VertexId> = near.map(|entry| entry.data).collect();
-    vertices.sort_unstable();
-    let mut list = Vec::new();
-    vertices.into_iter().for_each(|vertex| name(&mut list, vertex));
     list
 }
 
@@ -399,8 +383,9 @@ pub struct ShaftScene<'w> {
 }
 
 impl ShaftScene<'_> {
-    fn reference(&self, site: Site) -> Vector3<f64> {
-        self.tissue.reference_position(site)
+    /// Reference position of a site (µm).
+    fn reference(&self, site: Site) -> [f64; 2] {
+        site.planar().position(&self.tissue.mesh, self.tissue.mesh.vertices())
     }
 
     /// Position of a material point now (µm).
@@ -434,7 +419,6 @@ fn index_new_vertices(
     for Struck { vertex, point } in shafts.take_struck() {
         let at = tissue.reference_position(point.into());
         index.forget(vertex, [at.x, at.y], shafts.longest);
-        index.places.forget(vertex / BLOCK as u32, &shafts);
     }
     for vertex in shafts.take_laid() {
         let at = tissue.reference_position(shafts.point(vertex).into());

@@ -30,7 +30,7 @@ impl Mechanism for StericRepulsion {
     const NAME: &'static str = "steric_repulsion";
 
     fn install(self, model: &mut ModelBuilder) -> Result<(), InstallError> {
-        if ShaftIndex::install(model, self.distance.0, Search::Tree) {
+        if ShaftIndex::install(model, self.distance.0, Search::default()) {
             model.pulls_up_to(self.weight.0);
             model.insert_law(self).term(Term::Contact, repel);
         }

@@ -98,8 +98,8 @@ fn cones_show_the_orders_of_their_methods_and_neighbour_searches_agree() {
     let rotation = order(&found.factors[0], "position_median", "rotation");
     assert!(rotation > 1.5, "{rotation}");
     assert!(points(&found.factors[0], "bogacki_shampine").len() >= 5);
-    assert_eq!(found.factors[3].points.len(), 8);
-    assert_eq!(found.factors[3].growth().len(), 2);
+    assert_eq!(found.factors[3].points.len(), 12);
+    assert_eq!(found.factors[3].growth().len(), 3);
 }
 
 #[test]
@@ -150,7 +150,7 @@ fn the_command_writes_a_table_a_document_and_a_figure_a_factor() {
     assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
     let out = folder.0.join("out/scene-chart");
     let table = std::fs::read_to_string(out.join("chart.csv")).unwrap();
-    assert_eq!(table.lines().count(), 1 + 8, "{table}");
+    assert_eq!(table.lines().count(), 1 + 12, "{table}");
     let document: Value = serde_json::from_str(&std::fs::read_to_string(out.join("chart.json")).unwrap()).unwrap();
     assert_eq!(document["factors"][0]["name"], "neighbours");
     for file in ["chart_neighbours.svg", "chart_neighbours.png"] {

@@ -76,19 +76,20 @@ fn contact_between_axons_does_not_depend_on_threads_either() {
 }
 
 #[test]
-fn the_tree_finds_what_looking_at_every_segment_of_a_deforming_tissue_finds() {
+fn grid_and_tree_find_what_looking_at_every_segment_of_a_deforming_tissue_finds() {
     let roster = systems::standard();
-    let [tree, all] = ["tree", "all"].map(|neighbours| {
+    let [grid, tree, all] = ["grid", "tree", "all"].map(|neighbours| {
         let mut scene = scene(60, 8.0, true);
         scene["fasciculation"] = json!({ "neighbours": neighbours });
         bits(&loaded(&scene, &roster))
     });
     assert_eq!(tree, all);
+    assert_eq!(grid, all);
 }
 
 /// Branches, retraction and zippering strike out what the index holds, in a deforming tissue.
 #[test]
-fn the_tree_finds_what_is_left_when_shafts_are_remodelled_on_any_number_of_threads() {
+fn grid_and_tree_find_what_is_left_when_shafts_are_remodelled_on_any_number_of_threads() {
     let roster = systems::standard();
     let run = |border: &str, neighbours: &str, threads: usize| {
         let mut scene = scene(60, 20.0, true);
@@ -101,8 +102,10 @@ fn the_tree_finds_what_is_left_when_shafts_are_remodelled_on_any_number_of_threa
         on_threads(threads, || bits(&loaded(&scene, &roster)))
     };
     for border in ["slide", "stall"] {
-        let tree = run(border, "tree", 2);
-        assert_eq!(tree, run(border, "all", 1), "{border}");
+        let all = run(border, "all", 1);
+        for neighbours in ["grid", "tree"] {
+            assert_eq!(run(border, neighbours, 2), all, "{border} {neighbours}");
+        }
     }
 }
 

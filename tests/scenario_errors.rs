@@ -162,12 +162,12 @@ fn each_bad_value_gets_its_own_sentence() {
         ),
         (
             r#"{"galvanotaxs": {}}"#,
-            "/galvanotaxs: unknown key; did you mean `galvanotaxis`? (keys here: $schema, base, name, description, seed, accuracy, space, tissue, time, growth, \
+            "/galvanotaxs: unknown key; did you mean `galvanotaxis`? (keys here: $schema, base, name, description, parameters, seed, accuracy, space, tissue, time, growth, \
              populations, targets, output, galvanotaxis)",
         ),
         (
             r#"{"galvanotaxs": null}"#,
-            "/galvanotaxs: unknown key; did you mean `galvanotaxis`? (keys here: $schema, base, name, description, seed, accuracy, space, tissue, time, growth, \
+            "/galvanotaxs: unknown key; did you mean `galvanotaxis`? (keys here: $schema, base, name, description, parameters, seed, accuracy, space, tissue, time, growth, \
              populations, targets, output, galvanotaxis)",
         ),
         (r#"{"seed": -1}"#, "/seed: -1 is outside what is possible: seed ≥ 0"),
@@ -225,7 +225,7 @@ fn each_bad_value_gets_its_own_sentence() {
         (
             r#"{"populations": {"a": {"origin": {"points": [[1, 1], [-1, 4]]}}}}"#,
             "/populations/a/origin/points/1: [-1, 4] lies outside the tissue\n\
-             /populations/a/heading: points have no inner normal; give an angle such as 90",
+             /populations/a/heading: points have no inner normal; give an angle such as 90, or \"random\"",
         ),
         (
             r#"{"populations": {"a": {"origin": {"points": [], "edge": "top"}}}}"#,

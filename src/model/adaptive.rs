@@ -122,11 +122,11 @@ fn largest_error(
     each_growing(world, cones, starts, span, |step, mover| {
         let (place, vector) = difference(step, mover, pair);
         let radius = mover.cone.speed * duration.min(1.0 / step.growth.turning_rate);
-        mover.start.error = place.norm() + radius * vector.norm();
+        mover.start.stages().error = place.norm() + radius * vector.norm();
     });
     let growing = cones.iter(world).zip(starts).filter(|(cone, _)| *cone.1 == Status::Growing);
     growing
-        .map(|(_, start)| start.error)
+        .map(|(_, start)| start.stages().error)
         .fold(0.0, |worst: f64, error| if worst.is_nan() || error <= worst { worst } else { error })
 }
 

@@ -7,7 +7,7 @@
 use super::clock::Clock;
 use super::components::SpringState;
 use super::integrator::{bring_tissue_to, evaluate_right_hand_side};
-use super::movers::{ConeQuery, Mover, Step, StepStart, each_growing, flat};
+use super::movers::{ConeQuery, Mover, Stages, Step, StepStart, each_growing, flat};
 use crate::numerics::runge_kutta::ButcherTableau;
 use crate::numerics::turning::perpendicular_part;
 use crate::numerics::walk::{BorderRule, nowhere, walk};
@@ -48,8 +48,7 @@ pub(super) fn run_stages(
 fn enter_stage(step: &Step, mover: &mut Mover, tableau: &ButcherTableau, stage: usize) {
     let spring = &mut *mover.spring;
     if stage == 0 {
-        *mover.start =
-            StepStart { site: *mover.site, heading: spring.heading, drift: spring.drift, ..StepStart::default() };
+        mover.start.begin(*mover.site, spring.heading, spring.drift);
     }
     let duration = step.duration(mover.cone);
     let (shift, vector) = combined(mover.start, tableau.a[stage], duration);
@@ -70,7 +69,8 @@ fn keep_rates(step: &Step, mover: &mut Mover, stage: usize) {
         let start = step.start(mover.cone);
         let middle = start + (step.to - start) / 2;
         let heading = mover.start.heading;
-        (mover.start.unkicked, mover.start.sampled) = (heading, *mover.spring);
+        let stages = mover.start.stages();
+        (stages.unkicked, stages.sampled) = (heading, *mover.spring);
         mover.start.heading = step.kicked(mover.cone, heading, mover.spring.heading_diffusion, (start, middle));
         mover.spring.heading = mover.start.heading;
     }
@@ -79,7 +79,7 @@ fn keep_rates(step: &Step, mover: &mut Mover, stage: usize) {
     let material = step.configuration.pull_back(&step.tissue.mesh, mover.site.cell, velocity);
     let turning = perpendicular_part(&spring.pull, &spring.heading) * step.growth.turning_rate
         + spring.spin.cross(&(spring.heading * spring.drift));
-    mover.start.rates[stage] = (material, turning);
+    mover.start.stages().rates[stage] = (material, turning);
 }
 
 /// Moves a cone by the weights of the tableau.
@@ -100,8 +100,9 @@ pub(super) fn finish(step: &Step, mover: &mut Mover, tableau: &ButcherTableau) {
 /// stage sampled holds for any length; only the kick of the first half is another.
 pub(super) fn start_again(step: &Step, mover: &mut Mover) {
     let start = &mut *mover.start;
-    (*mover.site, *mover.spring) = (start.site, start.sampled);
-    start.heading = start.unkicked;
+    let Stages { sampled, unkicked, .. } = *start.stages();
+    (*mover.site, *mover.spring) = (start.site, sampled);
+    start.heading = unkicked;
     start.fault = None;
     keep_rates(step, mover, 0);
 }
@@ -111,7 +112,7 @@ pub(super) fn start_again(step: &Step, mover: &mut Mover) {
 pub(super) fn difference(step: &Step, mover: &Mover, pair: &ButcherTableau) -> (Vector3<f64>, Vector3<f64>) {
     let duration = step.duration(mover.cone);
     let (mut shift, mut vector) = (Vector3::zeros(), Vector3::zeros());
-    for ((b, other), (velocity, turning)) in pair.b.iter().zip(pair.embedded).zip(&mover.start.rates) {
+    for ((b, other), (velocity, turning)) in pair.b.iter().zip(pair.embedded).zip(mover.start.rates()) {
         shift += velocity * ((b - other) * duration);
         vector += turning * ((b - other) * duration);
     }
@@ -122,7 +123,7 @@ pub(super) fn difference(step: &Step, mover: &Mover, pair: &ButcherTableau) -> (
 fn combined(start: &StepStart, weights: &[f64], duration: f64) -> (Vector3<f64>, Vector3<f64>) {
     let mut shift = Vector3::zeros();
     let mut vector = start.heading * start.drift;
-    for (&weight, (velocity, turning)) in weights.iter().zip(&start.rates) {
+    for (&weight, (velocity, turning)) in weights.iter().zip(start.rates()) {
         shift += velocity * (weight * duration);
         vector += turning * (weight * duration);
     }

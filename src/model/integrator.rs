@@ -29,7 +29,7 @@ pub const BYTES_A_STEP: usize = size_of::<StepStart>();
 pub fn advance(world: &mut World, cones: &mut ConeQuery, mut starts: Local<Vec<StepStart>>) {
     let clock = *world.resource::<Clock>();
     let (from, mut to) = (clock.now, clock.now + clock.next_step());
-    starts.resize(cones.iter(world).count(), StepStart::default());
+    starts.resize_with(cones.iter(world).count(), StepStart::default);
     let mut growing = cones.iter(world).filter(|cone| *cone.1 == Status::Growing).count() as u64;
     if growing > 0 {
         match world.resource::<Growth>().method {
@@ -71,7 +71,7 @@ pub fn bring_tissue_to(world: &mut World, time: f64) {
 }
 
 /// Runs the right-hand side at the stage's time.
-pub(super) fn evaluate_right_hand_side(world: &mut World) {
+pub fn evaluate_right_hand_side(world: &mut World) {
     world.resource_mut::<Counters>().stages += 1;
     world.resource_mut::<Stopwatch>().lap("integrate");
     world.resource_scope::<RightHandSide, _>(|world, mut stage| stage.0.run(world));
@@ -89,8 +89,7 @@ fn rotation_step(world: &mut World, cones: &mut ConeQuery, starts: &mut [StepSta
 fn predict_midpoint(step: &Step, mover: &mut Mover) {
     let half = 0.5 * step.duration(mover.cone);
     let spring = &mut *mover.spring;
-    *mover.start =
-        StepStart { site: *mover.site, heading: spring.heading, drift: spring.drift, ..StepStart::default() };
+    mover.start.begin(*mover.site, spring.heading, spring.drift);
     let speed = mover.cone.speed * spring.speed_factor;
     let forward = spring.heading * (speed * half);
     spring.heading = spun(

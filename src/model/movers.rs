@@ -29,11 +29,19 @@ pub(super) type ConeData = (
 pub(super) type ConeQuery = QueryState<ConeData, With<GrowthCone>>;
 
 /// What is kept of a cone during a step.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Default)]
 pub struct StepStart {
     pub(super) site: Site,
     pub(super) heading: Vector3<f64>,
     pub(super) drift: f64,
+    /// What methods of several stages keep besides; made when one of them needs it.
+    stages: Option<Box<Stages>>,
+    pub(super) fault: Option<WalkError>,
+}
+
+/// What the stages of an explicit method found.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Stages {
     /// Material velocity and rate of the velocity vector over v_g, for each stage.
     pub(super) rates: [(Vector3<f64>, Vector3<f64>); STAGES],
     /// Heading before the kick of the first half, and what the first stage found: what a shorter step begins from.
@@ -41,7 +49,23 @@ pub struct StepStart {
     pub(super) sampled: SpringState,
     /// Estimated error of the step (µm), for an embedded pair.
     pub(super) error: f64,
-    pub(super) fault: Option<WalkError>,
+}
+
+impl StepStart {
+    /// What several stages keep, made if it is not there yet.
+    pub(super) fn stages(&mut self) -> &mut Stages {
+        self.stages.get_or_insert_default()
+    }
+
+    /// What the stages so far found; nothing before the first.
+    pub(super) fn rates(&self) -> &[(Vector3<f64>, Vector3<f64>)] {
+        self.stages.as_deref().map_or(&[], |stages| &stages.rates)
+    }
+
+    /// Begins a step; what the stages of the one before found is no longer looked at.
+    pub(super) fn begin(&mut self, site: Site, heading: Vector3<f64>, drift: f64) {
+        (self.site, self.heading, self.drift, self.fault) = (site, heading, drift, None);
+    }
 }
 
 /// One cone during a stage.

@@ -13,7 +13,7 @@ pub type Part = (u32, u16);
 /// included. Runs in the widest vector registers that the processor has.
 pub fn meeting<const N: usize>(
     polylines: &[Polyline<N>],
-    list: &[Part],
+    list: impl Iterator<Item = Part>,
     [low, high]: [Vector2<f64>; 2],
     met: &mut Vec<Part>,
 ) {
@@ -23,15 +23,15 @@ pub fn meeting<const N: usize>(
 }
 
 /// What implements `WithSimd` is compiled once for each register width.
-struct Meet<'a, const N: usize> {
+struct Meet<'a, const N: usize, I> {
     polylines: &'a [Polyline<N>],
-    list: &'a [Part],
+    list: I,
     low: Vector2<f64>,
     high: Vector2<f64>,
     met: &'a mut Vec<Part>,
 }
 
-impl<const N: usize> WithSimd for Meet<'_, N> {
+impl<const N: usize, I: Iterator<Item = Part>> WithSimd for Meet<'_, N, I> {
     type Output = ();
 
     #[inline(always)]
@@ -40,7 +40,7 @@ impl<const N: usize> WithSimd for Meet<'_, N> {
         let meets = |line: &[f64; N], i: usize, low: f64, high: f64| {
             (line[i].max(line[i + 1]) >= low) & (line[i].min(line[i + 1]) <= high)
         };
-        for &(polyline, meant) in list {
+        for (polyline, meant) in list {
             let [x, y] = &polylines[polyline as usize];
             let near = |i: usize| meets(x, i, low.x, high.x) & meets(y, i, low.y, high.y);
             let bits = (0..N - 1).fold(0, |bits, i| bits | (u16::from(near(i)) << i)) & meant;
@@ -62,11 +62,11 @@ mod tests {
         let far = [[20.0; 5], [0.5; 5]];
         let mut met = vec![(7, 7)];
         let unit = [Vector2::new(0.0, 0.0), Vector2::new(1.0, 1.0)];
-        meeting(&[line, far], &[(0, 0b1111), (1, 0b1111)], unit, &mut met);
+        meeting(&[line, far], [(0, 0b1111), (1, 0b1111)].into_iter(), unit, &mut met);
         assert_eq!(met, [(0, 0b0110)]);
-        meeting(&[line, far], &[(0, 0b1011)], unit, &mut met);
+        meeting(&[line, far], [(0, 0b1011)].into_iter(), unit, &mut met);
         assert_eq!(met, [(0, 0b0010)]);
-        meeting(&[line], &[(0, 0b0001)], [Vector2::new(-3.0, 0.5), Vector2::new(0.0, 0.5)], &mut met);
+        meeting(&[line], [(0, 0b0001)].into_iter(), [Vector2::new(-3.0, 0.5), Vector2::new(0.0, 0.5)], &mut met);
         assert_eq!(met, [(0, 0b0001)], "a touch counts");
     }
 }

@@ -122,18 +122,24 @@ fn check_origin(population: &Population, outline: &Outline, pointer: &str, viola
                 format!("the part from {} to {} has no length", part.from, part.to)
             });
         }
+        Origin::Tissue => demand_direction(population, "the inside of a tissue has", pointer, violations),
         Origin::Points(points) => {
             for (index, point) in coordinates(points).into_iter().enumerate() {
                 violations.demand(is_inside(outline, point), &format!("{pointer}/origin/points/{index}"), || {
                     format!("[{}, {}] lies outside the tissue", format_number(point[0]), format_number(point[1]))
                 });
             }
-            let along = population.heading == Heading::Along(Direction::InnerNormal);
-            violations.demand(!along, &format!("{pointer}/heading"), || {
-                "points have no inner normal; give an angle such as 90".to_owned()
-            });
+            demand_direction(population, "points have", pointer, violations);
         }
     }
+}
+
+/// Demands a heading that does not need an edge.
+fn demand_direction(population: &Population, what: &str, pointer: &str, violations: &mut Violations) {
+    let along = population.heading == Heading::Along(Direction::InnerNormal);
+    violations.demand(!along, &format!("{pointer}/heading"), || {
+        format!("{what} no inner normal; give an angle such as 90, or \"random\"")
+    });
 }
 
 fn check_births(population: &Population, duration: Time, pointer: &str, violations: &mut Violations) {

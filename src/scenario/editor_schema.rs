@@ -2,7 +2,7 @@
 //!
 //! It differs from the schema of [`full_schema`], along which the program itself walks, where that walk knows more than
 //! keywords say: `null` removes a key wherever one may be absent; a text must have a unit of the right dimension; and a file
-//! with a `base` is a patch, which may give some keys of an object only, or `null` for the variant that it replaces. So
+//! with a `base` is a patch, which may give some keys of an object only, or `null` for the variant that it replaces; and an expression may stand for any number. So
 //! nothing that loads is refused; that a key is missing, only loading tells.
 
 use serde_json::{Map, Value, json};
@@ -11,6 +11,9 @@ use super::schema::{BlockSchema, full_schema};
 use super::schema_view::{kind_of, unescaped, words_of};
 use crate::model::quantity::Kind;
 use crate::model::unit_pattern::pattern_of;
+
+/// What a text that is an expression fits.
+const EXPRESSION: &str = "^=";
 
 /// The JSON schema (draft 2020-12) of a scene's file with these blocks.
 pub fn editor_schema(blocks: &[BlockSchema]) -> Value {
@@ -37,6 +40,7 @@ fn loosen(schema: &mut Value, kinds: &mut Map<String, Value>) {
             }
             name_kind(schema, kinds);
             if let Value::Object(keywords) = schema {
+                allow_expression(keywords);
                 allow_other_tags(keywords);
                 allow_absence(keywords);
             }
@@ -60,10 +64,18 @@ fn name_kind(schema: &mut Value, kinds: &mut Map<String, Value>) {
 }
 
 fn definition_of(kind: Kind<'_>) -> Option<(String, Value)> {
-    let pattern = pattern_of(kind).ok()?;
+    let pattern = format!("{EXPRESSION}|{}", pattern_of(kind).ok()?);
     let message = format!("{} belongs here", kind.wanted(1.0));
     let name = format!("quantity.{}", kind.name.replace(' ', "_"));
     Some((name, json!({ "pattern": pattern, "patternErrorMessage": message })))
+}
+
+/// Lets an expression stand for a number that is no quantity.
+fn allow_expression(keywords: &mut Map<String, Value>) {
+    if let Some(number) = keywords.get("type").filter(|word| **word == "integer" || **word == "number").cloned() {
+        keywords.insert("type".to_owned(), json!([number, "string"]));
+        keywords.insert("pattern".to_owned(), json!(EXPRESSION));
+    }
 }
 
 /// The key of an externally tagged variant.

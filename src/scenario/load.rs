@@ -9,6 +9,7 @@ use serde_json::{Map, Value};
 use thiserror::Error;
 
 use super::checks::check_region;
+use super::expressions;
 use super::merge::{idle_removals, merge, strip_nulls};
 use super::overrides;
 use super::read::read_file;
@@ -105,6 +106,7 @@ pub fn load_document(name: &str, value: Value, blocks: &[BlockSchema]) -> Result
 fn check(chain: &[Document], request: &Request, blocks: &[BlockSchema]) -> Result<Loaded, ScenarioErrors> {
     let mut draft = Draft::merge(chain);
     draft.apply_overrides(request, blocks);
+    expressions::evaluate(&mut draft.document, &mut draft.problems);
     draft.walk(blocks);
     draft.name_origins(chain);
     let stem = request.path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();

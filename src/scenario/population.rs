@@ -17,7 +17,7 @@ keys! {
         pub speed: Speed = Speed(20.0),
         /// Where they are born.
         pub origin: Origin = Origin::Edge(EdgeOrigin::Name("bottom".to_owned())),
-        /// Their first heading: `inner_normal` of the edge they are born on, or an angle, counter-clockwise from the x axis.
+        /// Their first heading: `inner_normal` of the edge they are born on, `random`, or an angle, counter-clockwise from the x axis.
         pub heading: Heading = Heading::Along(Direction::InnerNormal),
         /// When they are born; by default uniformly over the first quarter of the duration.
         pub births: Option<Births> = None,
@@ -30,6 +30,8 @@ keys! {
 pub enum Origin {
     /// Evenly spread draws along an edge, or a part of it.
     Edge(EdgeOrigin),
+    /// Evenly over the tissue: one in each of as many equal parts of it, in the order of its cells.
+    Tissue,
     /// These points \[µm\], over and over: the axon number i starts at the point number i modulo their count.
     Points(#[schemars(length(min = 1))] Vec<Point>),
 }
@@ -69,18 +71,20 @@ fn whole() -> Factor {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(untagged)]
 pub enum Heading {
-    /// A direction the place of birth gives.
+    /// A direction that is not given as a number.
     Along(Direction),
     /// An angle, counter-clockwise from the x axis.
     Angle(Angle),
 }
 
-/// A direction that the place of birth gives.
+/// A direction that is not given as a number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Direction {
     /// Into the tissue, at right angles to the edge.
     InnerNormal,
+    /// Any direction, drawn evenly.
+    Random,
 }
 
 /// When axons are born.

@@ -25,6 +25,9 @@ keys! {
         pub name: String = String::new(),
         /// What the scene shows, in a sentence. It is not taken over from a base.
         pub description: String = String::new(),
+        /// Numbers by name, for texts that begin with `=`: with `"axons": 400`, `"= 20*sqrt(axons) um"` is `"400 um"`. A parameter may be such
+        /// a text over those before it.
+        pub parameters: BTreeMap<String, f64> = BTreeMap::new(),
         /// The seed of every random draw.
         pub seed: u64 = 1,
         /// Root mean square error of tips over the length of their paths, in place of mesh size, step and load levels, which

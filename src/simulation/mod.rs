@@ -12,7 +12,7 @@ use crate::model::adaptive::idle_until;
 use crate::model::clock::Clock;
 use crate::model::components::{GrowthCone, Status};
 use crate::model::health::{Counters, Fault, Health};
-use crate::model::integrator::bring_tissue_to;
+use crate::model::integrator::{bring_tissue_to, evaluate_right_hand_side};
 use crate::model::mechanism::Roster;
 use crate::model::remodel::Unrest;
 use crate::model::shelf::Shelf;
@@ -112,6 +112,13 @@ impl Simulation {
     /// Brings the tissue and what rides on it to any time (h), without a step: for a look at a moment.
     pub fn look_at(&mut self, time: f64) {
         bring_tissue_to(&mut self.world, time);
+    }
+
+    /// Brings tissue and fields to any time (h) and evaluates the right-hand side there, for those who look at fields without a step.
+    /// Growing cones lose the pull that they felt last.
+    pub fn evaluate_at(&mut self, time: f64) {
+        bring_tissue_to(&mut self.world, time);
+        evaluate_right_hand_side(&mut self.world);
     }
 
     fn is_idle(&mut self, to: u64) -> bool {

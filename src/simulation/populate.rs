@@ -17,11 +17,12 @@ use crate::model::shafts::Shafts;
 use crate::model::tissue::Tissue;
 use crate::model::violation::Violation;
 use crate::numerics::simplex_mesh::BorderFacet;
-use crate::scenario::scene::{self, Heading, Scene};
+use crate::scenario::scene::{self, Direction, Heading, Scene};
 use bevy_ecs::entity::Entity;
 use bevy_ecs::prelude::{With, World};
 use nalgebra::Vector3;
 use rand::RngExt;
+use std::f64::consts::TAU;
 
 /// Stream of the draws at birth.
 const BIRTHS: Stream = Stream::named("births");
@@ -31,6 +32,8 @@ const WHEN: u64 = 0;
 const NEVER: u64 = u64::MAX;
 /// Draw of the birth place.
 const WHERE: u64 = 1;
+/// Draw of the first heading.
+const WHITHER: u64 = 2;
 
 /// Largest distance between a stored shaft and the true path (µm). Ours.
 const SHAFT_TOLERANCE: f64 = 0.5;
@@ -50,7 +53,7 @@ pub(super) fn spawn_cones(world: &mut World, scene: &Scene, spares: u32) -> Resu
     let mut of_shaft = Vec::new();
     for (index, (name, keys)) in scene.populations.iter().enumerate() {
         list.push(Population { name: name.clone(), speed: keys.speed.0, count: keys.count as usize });
-        let places = Places::new(world.resource::<Tissue>(), name, keys)?;
+        let places = Places::new(world.resource::<Tissue>(), name, keys, cones.len() as u32)?;
         for _ in 0..keys.count {
             let number = cones.len() as u32;
             let birth = birth_instant(world, scene, keys, number);
@@ -122,38 +125,37 @@ fn birth_instant(world: &World, scene: &Scene, keys: &scene::Population, number:
     world.resource::<Clock>().grid.nearest_birth(from.0 + share * (to.0 - from.0))
 }
 
-/// Where a population can be born.
-enum Places {
+/// Where a population can be born, and how it heads then.
+struct Places {
+    place: Place,
+    heading: Heading,
+}
+
+enum Place {
     /// Facets of an edge with their lengths added up, and the part of the whole in use.
-    Edge { facets: Vec<(BorderFacet, f64)>, from: f64, to: f64, heading: Option<Vector3<f64>> },
-    /// Given points, and the heading.
-    Points { sites: Vec<Site>, heading: Vector3<f64> },
+    Edge { facets: Vec<(BorderFacet, f64)>, from: f64, to: f64 },
+    /// Given points.
+    Points(Vec<Site>),
+    /// The areas of the cells added up, the number of the first axon, and how many there are.
+    Tissue { areas: Vec<f64>, first: u32, count: f64 },
 }
 
 impl Places {
-    fn new(tissue: &Tissue, name: &str, keys: &scene::Population) -> Result<Self, AssemblyError> {
+    fn new(tissue: &Tissue, name: &str, keys: &scene::Population, first: u32) -> Result<Self, AssemblyError> {
         let at = |key: &str, message: String| {
             AssemblyError::Scenario(vec![Violation::new(format!("/populations/{name}/{key}"), message)])
         };
-        let heading = match keys.heading {
-            Heading::Along(_) => None,
-            Heading::Angle(angle) => Some(Vector3::new(angle.radians().cos(), angle.radians().sin(), 0.0)),
-        };
-        match &keys.origin {
+        let place = match &keys.origin {
             scene::Origin::Edge(edge) => {
                 let part = edge.part();
                 let index = tissue
                     .edge(&part.name)
                     .ok_or_else(|| at("origin", format!("there is no edge called `{}`", part.name)))?;
-                let mut sum = 0.0;
-                let facets: Vec<_> = tissue.edges[index]
-                    .iter()
-                    .map(|facet| {
-                        sum += length(tissue, *facet);
-                        (*facet, sum)
-                    })
-                    .collect();
-                Ok(Self::Edge { facets, from: part.from.0 * sum, to: part.to.0 * sum, heading })
+                let lengths = tissue.edges[index].iter().map(|facet| length(tissue, *facet));
+                let sums = added_up(lengths);
+                let sum = sums.last().copied().unwrap_or_default();
+                let facets = tissue.edges[index].iter().copied().zip(sums).collect();
+                Place::Edge { facets, from: part.from.0 * sum, to: part.to.0 * sum }
             }
             scene::Origin::Points(points) => {
                 let locate = |point: &[crate::model::quantity::Length; 2]| {
@@ -161,31 +163,63 @@ impl Places {
                         at("origin/points", format!("({}, {}) lies outside the tissue", point[0], point[1]))
                     })
                 };
-                let sites = points.iter().map(locate).collect::<Result<Vec<_>, _>>()?;
-                let heading = heading.ok_or_else(|| {
-                    at("heading", "axons born at points need an angle: a point has no inner normal".into())
-                })?;
-                Ok(Self::Points { sites, heading })
+                Place::Points(points.iter().map(locate).collect::<Result<Vec<_>, _>>()?)
             }
+            scene::Origin::Tissue => {
+                let mesh = &tissue.mesh;
+                let areas = added_up((0..mesh.cell_count()).map(|cell| mesh.volume(mesh.vertices(), cell)));
+                Place::Tissue { areas, first, count: keys.count as f64 }
+            }
+        };
+        let needs_edge = keys.heading == Heading::Along(Direction::InnerNormal);
+        if needs_edge && !matches!(place, Place::Edge { .. }) {
+            return Err(at("heading", "axons that are not born on an edge have no inner normal".into()));
         }
+        Ok(Self { place, heading: keys.heading })
     }
 
     fn origin(&self, tissue: &Tissue, seed: u64, number: u32) -> Origin {
-        match self {
-            Self::Points { sites, heading } => {
-                Origin { site: sites[number as usize % sites.len()], heading: FirstHeading::Fixed(*heading) }
-            }
-            Self::Edge { facets, from, to, heading } => {
-                let share: f64 = KeyedRng::new(seed, number, BIRTHS, WHERE).random();
+        let mut draws = KeyedRng::new(seed, number, BIRTHS, WHERE);
+        let (site, facet) = match &self.place {
+            Place::Points(sites) => (sites[number as usize % sites.len()], None),
+            Place::Edge { facets, from, to } => {
+                let share: f64 = draws.random();
                 let along = from + share * (to - from);
                 let place = facets.partition_point(|(_, sum)| *sum <= along).min(facets.len() - 1);
                 let (facet, sum) = facets[place];
                 let rest = ((sum - along) / length(tissue, facet)).clamp(0.0, 1.0);
-                let heading = heading.map_or(FirstHeading::InnerNormal(facet), FirstHeading::Fixed);
-                Origin { site: on_facet(facet, rest), heading }
+                (on_facet(facet, rest), Some(facet))
             }
+            Place::Tissue { areas, first, count } => {
+                let [share, a, b]: [f64; 3] = [draws.random(), draws.random(), draws.random()];
+                let along = (f64::from(number - first) + share) / count * areas.last().copied().unwrap_or_default();
+                let cell = areas.partition_point(|sum| *sum <= along).min(areas.len() - 1);
+                // Folded back, two even draws fill the triangle evenly.
+                let weights = if a + b > 1.0 { [1.0 - a, 1.0 - b, 0.0] } else { [a, b, 0.0] };
+                (Site { cell: cell as u32, weights }, None)
+            }
+        };
+        Origin { site, heading: self.first_heading(seed, number, facet) }
+    }
+
+    fn first_heading(&self, seed: u64, number: u32, facet: Option<BorderFacet>) -> FirstHeading {
+        let fixed = |angle: f64| FirstHeading::Fixed(Vector3::new(angle.cos(), angle.sin(), 0.0));
+        match (self.heading, facet) {
+            (Heading::Angle(angle), _) => fixed(angle.radians()),
+            (Heading::Along(Direction::InnerNormal), Some(facet)) => FirstHeading::InnerNormal(facet),
+            (Heading::Along(_), _) => fixed(TAU * KeyedRng::new(seed, number, BIRTHS, WHITHER).share()),
         }
     }
+}
+
+/// The sums of the first one, two, … numbers.
+fn added_up(numbers: impl Iterator<Item = f64>) -> Vec<f64> {
+    numbers
+        .scan(0.0, |sum, number| {
+            *sum += number;
+            Some(*sum)
+        })
+        .collect()
 }
 
 /// The site on a facet whose first vertex has weight `first` and whose last has the rest.

@@ -33,6 +33,11 @@ pub fn misfits(root: &Value, schema: &Value, value: &Value, pointer: &str) -> Ve
         Some(Value::Array(types)) => types.as_slice(),
         one => one.map(std::slice::from_ref).unwrap_or_default(),
     };
+    // Patterns of units are left to the tests of units; that of an expression is short.
+    let is_expression = keywords.get("pattern").and_then(Value::as_str) == Some("^=");
+    if is_expression && value.as_str().is_some_and(|text| !text.starts_with('=')) {
+        found.push(format!("{pointer}: {value} is no expression"));
+    }
     if !types.is_empty() && !types.iter().any(|name| is_of_type(value, name.as_str().unwrap())) {
         found.push(format!("{pointer}: {value} is of none of the types {types:?}"));
     }

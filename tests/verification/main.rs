@@ -7,6 +7,7 @@ mod figures;
 mod gradient_recovery;
 mod load_path;
 mod materials;
+mod plain_loop;
 mod quadratic_field;
 mod reaction_diffusion;
 mod tissue_growth;

@@ -1,4 +1,4 @@
-//! The neighbours' chart: an R-tree with lists against a look at every segment of every shaft.
+//! The neighbours' chart: a grid and an R-tree, both with lists, against a look at every segment of every shaft.
 
 use super::work_precision::{Factor, Point, short, time};
 use crate::study::laboratory::{Laboratory, Setting, cones};
@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 const SHARES: [f64; 4] = [0.125, 0.25, 0.5, 1.0];
 /// The part of the run that is timed.
 const RUN_SHARE: f64 = 0.25;
-const METHODS: [(&str, &str); 2] = [("R-tree", "tree"), ("every segment", "all")];
+const METHODS: [(&str, &str); 3] = [("grid", "grid"), ("R-tree", "tree"), ("every segment", "all")];
 
 /// Time for contact against the number of axons; none in a scene without contact.
 ///
@@ -40,7 +40,7 @@ pub fn chart(laboratory: &Laboratory, tick: &dyn Fn(f64)) -> Result<Option<Facto
                 words: format!("{axons} axons"),
                 knob: axons as f64,
                 set,
-                default: share == 1.0 && key == "tree",
+                default: share == 1.0 && key == METHODS[0].1,
             };
             let counters = simulation.counters();
             let counts = [("segments", counters.indexed_segments), ("queries", counters.neighbour_queries)];
@@ -53,10 +53,10 @@ pub fn chart(laboratory: &Laboratory, tick: &dyn Fn(f64)) -> Result<Option<Facto
         }
     }
     let remark =
-        format!("Up to t = {} h. Both give every cone the same place and heading, to the last bit.", short(stop));
+        format!("Up to t = {} h. All give every cone the same place and heading, to the last bit.", short(stop));
     Ok(Some(Factor {
         name: "neighbours".into(),
-        title: "Neighbours: R-tree with lists against every segment".into(),
+        title: "Neighbours: grid and R-tree with lists against every segment".into(),
         knob: "axons".into(),
         errors: Vec::new(),
         advice: compare(&points),
@@ -66,14 +66,14 @@ pub fn chart(laboratory: &Laboratory, tick: &dyn Fn(f64)) -> Result<Option<Facto
 }
 
 fn compare(points: &[Point]) -> String {
-    let last = |method: &str| points.iter().rev().find(|point| point.method == method);
-    match (last(METHODS[0].0), last(METHODS[1].0)) {
-        (Some(tree), Some(all)) => format!(
-            "At {} the tree takes {}, every segment {}: {} times as long.",
-            tree.setting,
-            time(tree.seconds.median),
-            time(all.seconds.median),
-            short(all.seconds.median / tree.seconds.median)
+    let last = |(method, _): (&str, &str)| points.iter().rev().find(|point| point.method == method);
+    match METHODS.map(last) {
+        [Some(grid), Some(tree), Some(all)] => format!(
+            "At {} the grid takes {}; the tree takes {} times as long, a look at every segment {} times.",
+            grid.setting,
+            time(grid.seconds.median),
+            short(tree.seconds.median / grid.seconds.median),
+            short(all.seconds.median / grid.seconds.median)
         ),
         _ => String::new(),
     }

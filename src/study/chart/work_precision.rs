@@ -177,7 +177,7 @@ pub fn time(seconds: f64) -> String {
 }
 
 /// Least-squares slope of y over x; none for fewer than two different x.
-fn slope(points: &[[f64; 2]]) -> Option<f64> {
+pub(in crate::study) fn slope(points: &[[f64; 2]]) -> Option<f64> {
     let n = points.len() as f64;
     let mean = |k: usize| points.iter().map(|point| point[k]).sum::<f64>() / n;
     let (x, y) = (mean(0), mean(1));

@@ -1,0 +1,229 @@
+//! `tropism bench`: how many growth cones a second, at several numbers of axons, beside a plain loop over arrays of the same mathematics.
+//!
+//! The scene says how it grows: its key `parameters/axons` is set to each number. What counts is the time that cones take: tissue and
+//! fields are the same for both and are told apart as the scene's own. Seconds are those of one thread.
+
+mod plain;
+pub mod report;
+
+use super::chart::work_precision::{Seconds, slope};
+use super::laboratory::{Laboratory, cones};
+use super::run::RunError;
+use crate::model::clock::Clock;
+use crate::model::health::Counters;
+use crate::model::shafts::Shafts;
+use crate::model::stopwatch::Stopwatch;
+use crate::model::tissue::Configuration;
+use crate::model::violation::pointer_token;
+use crate::scenario::load::Loaded;
+use crate::simulation::Simulation;
+use plain::PlainLoop;
+use serde::Serialize;
+use std::collections::BTreeMap;
+
+/// The key that scales a scene.
+const KEY: &str = "/parameters/axons";
+/// Phases that are not the cones': what is solved before the run, and what moves tissue and fields.
+const SCENERY: [&str; 7] = ["mesh", "assembly", "matrix", "cues", "matrix motion", "cue fields", "record"];
+/// With more axons than this there is no plain loop beside: it would take long.
+const MOST_PLAIN: u64 = 200_000;
+/// With more axons than this each run is timed once.
+const MOST_REPEATED: u64 = 50_000;
+/// Looks at the clock during a run.
+const LOOKS: usize = 8;
+
+/// One number of axons, measured.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Row {
+    /// Axons.
+    pub axons: u64,
+    /// Steps of growing cones.
+    pub cone_steps: u64,
+    /// Hours that cones grew, all together.
+    pub cone_hours: f64,
+    /// Seconds that cones took.
+    pub seconds: Seconds,
+    /// Seconds of mesh, tissue and fields.
+    pub scenery_seconds: f64,
+    /// Seconds of the plain loop.
+    pub plain_seconds: Option<Seconds>,
+    /// Seconds of cones over those of the plain loop, both medians.
+    pub ratio: Option<f64>,
+    /// Largest distance between the ends of the same cone in both (µm).
+    pub difference: Option<f64>,
+    /// Steps of growing cones a second.
+    pub cone_steps_a_second: f64,
+    /// Cone-hours a second.
+    pub cone_hours_a_second: f64,
+    /// The same, tissue and fields included.
+    pub cone_hours_a_second_with_scenery: f64,
+    /// Power with which the cones' time grows with the cone-steps of one run.
+    pub growth_in_steps: f64,
+    /// Bytes of memory an axon that the run had taken by its end, tissue and fields included; none where the system does not say.
+    pub bytes_an_axon: Option<f64>,
+    /// Stored vertices an axon.
+    pub vertices_an_axon: f64,
+    /// Share of each phase in the cones' time.
+    pub share: BTreeMap<String, f64>,
+}
+
+/// All numbers of axons.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Bench {
+    /// Name of the scene.
+    pub scene: String,
+    /// Threads of the simulation; the plain loop has one.
+    pub threads: usize,
+    /// Power with which the time of a cone-step grows with the number of axons.
+    pub growth_in_axons: Option<f64>,
+    /// What kept the plain loop from running, if anything.
+    pub without_plain: Option<String>,
+    /// The rows, by number of axons.
+    pub rows: Vec<Row>,
+}
+
+/// What one run of the simulation gave.
+struct Timed {
+    simulation: Simulation,
+    phases: BTreeMap<&'static str, f64>,
+    marks: Vec<[f64; 2]>,
+    bytes: Option<f64>,
+}
+
+/// Times a scene at several numbers of axons, ascending.
+///
+/// # Errors
+/// A scene without the key, one that cannot be assembled, a fault while running.
+pub fn bench(laboratory: &Laboratory, axons: &[u64], tick: &dyn Fn(f64)) -> Result<Bench, RunError> {
+    let scene = laboratory.scene()?;
+    if scene.merged.pointer(KEY).is_none() {
+        let message = format!("{} has no {KEY}, by which a bench scales it", laboratory.request.path.display());
+        return Err(RunError::Arguments(message));
+    }
+    let mut rows = Vec::new();
+    let mut without_plain = None;
+    for (done, &count) in axons.iter().enumerate() {
+        tick(done as f64 / axons.len() as f64);
+        rows.push(row(laboratory, count, &mut without_plain)?);
+    }
+    let costs: Vec<[f64; 2]> = rows.iter().map(|row| [row.axons as f64, 1.0 / row.cone_steps_a_second]).collect();
+    Ok(Bench {
+        scene: scene.scene.name,
+        threads: rayon::current_num_threads(),
+        growth_in_axons: fitted_power(&costs),
+        without_plain,
+        rows,
+    })
+}
+
+fn row(laboratory: &Laboratory, axons: u64, without_plain: &mut Option<String>) -> Result<Row, RunError> {
+    let loaded = laboratory.load(&[], &[format!("{KEY}={axons}")])?;
+    let repetitions = if axons > MOST_REPEATED { 1 } else { laboratory.repetitions };
+    let (mut own, mut plain, mut difference) = (Vec::new(), Vec::new(), None);
+    let mut last = None;
+    for _ in 0..repetitions {
+        drop(last.take());
+        let timed = run(laboratory, &loaded)?;
+        own.push(cone_seconds(&timed.phases));
+        if axons <= MOST_PLAIN {
+            match run_plain(laboratory, &loaded, &timed.simulation)? {
+                Ok((seconds, apart)) => {
+                    plain.push(seconds);
+                    difference = Some(apart);
+                }
+                Err(reason) => *without_plain = Some(reason),
+            }
+        }
+        last = Some(timed);
+    }
+    let timed = last.ok_or_else(|| RunError::Internal("nothing was timed".into()))?;
+    let seconds = Seconds::of(&own).ok_or_else(|| RunError::Internal("nothing was timed".into()))?;
+    let plain_seconds = Seconds::of(&plain);
+    let Timed { simulation, phases, marks, bytes } = timed;
+    let world = simulation.world();
+    let Counters { cone_steps, .. } = simulation.counters();
+    let cone_hours = cone_steps as f64 * loaded.scene.time.step.0;
+    let scenery_seconds: f64 = phases.iter().filter(|(phase, _)| SCENERY.contains(phase)).map(|(_, s)| s).sum();
+    let own_phases = phases.iter().filter(|(phase, _)| !SCENERY.contains(phase));
+    let total = cone_seconds(&phases).max(f64::MIN_POSITIVE);
+    Ok(Row {
+        axons,
+        cone_steps,
+        cone_hours,
+        seconds,
+        scenery_seconds,
+        plain_seconds,
+        ratio: plain_seconds.map(|plain| seconds.median / plain.median),
+        difference,
+        cone_steps_a_second: cone_steps as f64 / seconds.median,
+        cone_hours_a_second: cone_hours / seconds.median,
+        cone_hours_a_second_with_scenery: cone_hours / (seconds.median + scenery_seconds),
+        growth_in_steps: fitted_power(&marks).unwrap_or(f64::NAN),
+        bytes_an_axon: bytes.map(|bytes| bytes / axons as f64),
+        vertices_an_axon: world.resource::<Shafts>().vertex_count() as f64 / axons as f64,
+        share: own_phases.map(|(phase, s)| ((*phase).to_owned(), s / total)).collect(),
+    })
+}
+
+fn cone_seconds(phases: &BTreeMap<&'static str, f64>) -> f64 {
+    phases.iter().filter(|(phase, _)| !SCENERY.contains(phase)).map(|(_, seconds)| seconds).sum()
+}
+
+/// Assembles a scene and runs it to its end.
+fn run(laboratory: &Laboratory, loaded: &Loaded) -> Result<Timed, RunError> {
+    let before = resident_bytes();
+    let mut simulation = laboratory.assemble(loaded)?;
+    let end = simulation.world().resource::<Clock>().end;
+    let mut marks = Vec::new();
+    let mut next = 1;
+    while !simulation.is_over() {
+        simulation.step().map_err(|fault| RunError::Solve(fault.to_string()))?;
+        if simulation.world().resource::<Clock>().now as f64 >= end as f64 * next as f64 / LOOKS as f64 {
+            let seconds = cone_seconds(simulation.world().resource::<Stopwatch>().seconds());
+            marks.push([simulation.counters().cone_steps as f64, seconds]);
+            next += 1;
+        }
+    }
+    simulation.lap("record");
+    let bytes = resident_bytes().zip(before).map(|(after, before)| after - before);
+    let phases = simulation.world().resource::<Stopwatch>().seconds().clone();
+    Ok(Timed { simulation, phases, marks, bytes })
+}
+
+/// Seconds of the plain loop and the largest distance of its cones from those of a simulation (µm), or why it cannot run.
+fn run_plain(
+    laboratory: &Laboratory,
+    loaded: &Loaded,
+    simulation: &Simulation,
+) -> Result<Result<(f64, f64), String>, RunError> {
+    let duration = loaded.scene.time.duration.0;
+    let late =
+        |name: &String| format!("/populations{}/births={{\"at\": {}}}", pointer_token(name), duration * (1.0 - 1e-9));
+    let births: Vec<String> = loaded.scene.populations.keys().map(late).collect();
+    let axons = loaded.scene.populations.values().map(|population| population.count).sum::<u64>();
+    let empty = laboratory.load(&[], &[births, vec![format!("{KEY}={axons}")]].concat())?;
+    let mut stage = laboratory.assemble(&empty)?;
+    let mut plain = match PlainLoop::new(loaded, simulation.world(), stage.world()) {
+        Ok(plain) => plain,
+        Err(reason) => return Ok(Err(reason)),
+    };
+    plain.run(&mut stage);
+    stage.look_at(simulation.time());
+    let (mesh, now) = (&plain.tissue().mesh, stage.world().resource::<Configuration>());
+    let ends = plain.sites().map(|site| now.position(mesh, site));
+    let apart = cones(simulation).iter().zip(ends).map(|(cone, end)| (cone.position - end).norm()).fold(0.0, f64::max);
+    Ok(Ok((plain.seconds(), apart)))
+}
+
+/// The power p of y ~ x^p through some points.
+fn fitted_power(points: &[[f64; 2]]) -> Option<f64> {
+    slope(&points.iter().map(|point| point.map(f64::ln)).collect::<Vec<_>>())
+}
+
+/// Resident memory of this process (bytes), where the system tells.
+fn resident_bytes() -> Option<f64> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let line = status.lines().find(|line| line.starts_with("VmRSS:"))?;
+    let kib: f64 = line.split_whitespace().nth(1)?.parse().ok()?;
+    Some(1024.0 * kib)
+}

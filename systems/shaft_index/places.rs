@@ -1,0 +1,57 @@
+//! Where the blocks of shafts are now, each found once for all cones that look at it.
+//!
+//! Blocks lie in memory in the order in which they were begun, which is none in space. Those that are looked at are found anew at each
+//! stage, into an array in the order of those who look: what is near in space is then near in memory.
+
+use super::ShaftScene;
+use crate::model::shafts::BLOCK;
+use crate::numerics::polylines::{Part, Polyline};
+use rayon::prelude::*;
+
+/// Positions now (µm) of a block's vertices, and of the point that the last of them leads to.
+pub type Line = Polyline<{ BLOCK + 1 }>;
+
+/// Bytes held for a block.
+pub const BYTES_A_BLOCK: usize = size_of::<Line>() + 2 * size_of::<u32>();
+
+/// Polylines of the blocks that something looks at.
+#[derive(Debug, Default)]
+pub struct Places {
+    lines: Vec<Line>,
+    /// The block of each line.
+    blocks: Vec<u32>,
+    /// For each block the number of its line, good if that line is of the block.
+    numbers: Vec<u32>,
+}
+
+impl Places {
+    /// Finds the blocks of some parts where they are now.
+    pub fn find(&mut self, scene: &ShaftScene, looked_at: impl Iterator<Item = Part>) {
+        self.numbers.resize(scene.shafts.block_count(), 0);
+        self.blocks.clear();
+        for (block, _) in looked_at {
+            if self.blocks.get(self.numbers[block as usize] as usize) != Some(&block) {
+                self.numbers[block as usize] = self.blocks.len() as u32;
+                self.blocks.push(block);
+            }
+        }
+        self.lines.resize(self.blocks.len(), [[0.0; BLOCK + 1]; 2]);
+        let lines = self.lines.par_iter_mut().zip(&self.blocks);
+        lines.with_min_len(64).for_each(|(line, &block)| *line = scene.polyline(block));
+    }
+
+    /// The lines that were found.
+    pub fn lines(&self) -> &[Line] {
+        &self.lines
+    }
+
+    /// The number of the line of a block that was looked at.
+    pub fn number(&self, block: u32) -> u32 {
+        self.numbers[block as usize]
+    }
+
+    /// The block of a line.
+    pub fn block(&self, number: u32) -> u32 {
+        self.blocks[number as usize]
+    }
+}

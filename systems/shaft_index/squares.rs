@@ -1,0 +1,228 @@
+//! Lists of the stored vertices near each square of a grid over the reference configuration.
+//!
+//! Squares are numbered along a Morton curve, so that neighbours in the plane are near in memory and in the order of work. A square has
+//! a list from the moment something asks for it, and keeps it.
+
+use crate::model::shafts::BLOCK;
+use crate::prelude::VertexId;
+use std::collections::HashMap;
+use std::hash::{BuildHasherDefault, Hasher};
+
+/// Place of a square along the Morton curve.
+pub type Square = u64;
+
+/// The lists of all squares that have one.
+#[derive(Debug, Default)]
+pub struct Squares {
+    numbers: HashMap<Square, u32, BuildHasherDefault<SquareHasher>>,
+    lists: Vec<Vec<Listed>>,
+}
+
+/// A block of stored vertices in the list of a square.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Listed {
+    /// The block.
+    pub block: u32,
+    /// A bit for each vertex that is meant.
+    pub vertices: u16,
+    /// A bit for each of the 4 by 4 parts of the square to which one of them may be near.
+    pub parts: u16,
+}
+
+/// Hashes the place of a square: its bits are spread already, and are mixed once.
+#[derive(Debug, Default)]
+pub struct SquareHasher(u64);
+
+impl Hasher for SquareHasher {
+    fn finish(&self) -> u64 {
+        self.0
+    }
+
+    fn write(&mut self, bytes: &[u8]) {
+        bytes.iter().for_each(|&byte| self.write_u64(u64::from(byte)));
+    }
+
+    fn write_u64(&mut self, place: u64) {
+        let mixed = (self.0 ^ place).wrapping_mul(0x9E37_79B9_7F4A_7C15);
+        self.0 = mixed ^ (mixed >> 32);
+    }
+}
+
+impl Squares {
+    /// The list of a square; none if it has none yet.
+    pub fn get(&self, square: Square) -> Option<&[Listed]> {
+        self.numbers.get(&square).map(|&number| self.lists[number as usize].as_slice())
+    }
+
+    /// The list of a square, if it has one, to be changed.
+    pub fn get_mut(&mut self, square: Square) -> Option<&mut Vec<Listed>> {
+        self.numbers.get(&square).map(|&number| &mut self.lists[number as usize])
+    }
+
+    /// The list of a square, from now on.
+    pub fn make(&mut self, square: Square) -> &mut Vec<Listed> {
+        let next = self.lists.len() as u32;
+        let number = *self.numbers.entry(square).or_insert(next);
+        if number == next {
+            self.lists.push(Vec::new());
+        }
+        &mut self.lists[number as usize]
+    }
+
+    /// Forgets all lists.
+    pub fn clear(&mut self) {
+        self.numbers.clear();
+        self.lists.clear();
+    }
+}
+
+/// The square of side `side` (µm) that a point lies in.
+pub fn square(x: [f64; 2], side: f64) -> Square {
+    let [column, row] = x.map(|x| (x / side).floor() as i32);
+    morton(column, row)
+}
+
+/// The squares of side `side` that come nearer than `margin` (µm) to a point, rows first, each with a bit for each of its parts
+/// that does.
+pub fn squares_near(x: [f64; 2], margin: f64, side: f64) -> impl Iterator<Item = (Square, u16)> {
+    let low = x.map(|x| ((x - margin) / side).floor() as i32);
+    let high = x.map(|x| ((x + margin) / side).floor() as i32);
+    let squares = (low[1]..=high[1]).flat_map(move |row| (low[0]..=high[0]).map(move |column| [column, row]));
+    squares
+        .map(move |at| (morton(at[0], at[1]), parts_near(at.map(|i| f64::from(i) * side), x, margin, side)))
+        .filter(|(_, parts)| *parts != 0)
+}
+
+/// Low and high corner (µm) of a square.
+pub fn corners(square: Square, side: f64) -> [[f64; 2]; 2] {
+    let at = [even_bits(square), even_bits(square >> 1)].map(|bits| f64::from((bits ^ SIGN) as i32));
+    [at.map(|i| i * side), at.map(|i| (i + 1.0) * side)]
+}
+
+/// Puts negative numbers before the others.
+const SIGN: u32 = 1 << 31;
+
+fn morton(column: i32, row: i32) -> Square {
+    spread(column as u32 ^ SIGN) | spread(row as u32 ^ SIGN) << 1
+}
+
+/// The bits of a number at the even places.
+fn spread(bits: u32) -> u64 {
+    let mut x = u64::from(bits);
+    for (shift, mask) in [
+        (16, 0x0000_FFFF_0000_FFFF),
+        (8, 0x00FF_00FF_00FF_00FF),
+        (4, 0x0F0F_0F0F_0F0F_0F0F),
+        (2, 0x3333_3333_3333_3333),
+        (1, 0x5555_5555_5555_5555),
+    ] {
+        x = (x | x << shift) & mask;
+    }
+    x
+}
+
+fn even_bits(square: Square) -> u32 {
+    (0..32).fold(0, |bits, i| bits | (((square >> (2 * i)) & 1) as u32) << i)
+}
+
+/// Parts of a square along its side.
+const ALONG: usize = 4;
+
+/// The bit of the part of a square of side `side` (µm) that a point in it lies in.
+pub fn part_of(x: [f64; 2], side: f64) -> u16 {
+    let [column, row] = x.map(|x| {
+        let share = x / side;
+        (((share - share.floor()) * ALONG as f64) as usize).min(ALONG - 1)
+    });
+    1 << (row * ALONG + column)
+}
+
+/// The bits of the parts of a square with this low corner to which a point is nearer than `margin` (µm).
+pub fn parts_near(low: [f64; 2], x: [f64; 2], margin: f64, side: f64) -> u16 {
+    let width = side / ALONG as f64;
+    // A hair more, for the rounding of places and corners.
+    let reach = margin * (1.0 + 1e-9) + 1e-9 * side;
+    let squared = |k: usize, i: usize| {
+        let from = low[k] + i as f64 * width - x[k];
+        let away = from.max(-(from + width)).max(0.0);
+        away * away
+    };
+    let columns: [f64; ALONG] = std::array::from_fn(|i| squared(0, i));
+    let rows: [f64; ALONG] = std::array::from_fn(|i| squared(1, i));
+    let near = |part: usize| columns[part % ALONG] + rows[part / ALONG] <= reach * reach;
+    (0..ALONG * ALONG).fold(0, |bits, part| bits | u16::from(near(part)) << part)
+}
+
+/// Puts a vertex into a list, which is ascending, for some parts of its square.
+pub fn name(list: &mut Vec<Listed>, vertex: VertexId, parts: u16) {
+    let (block, bit) = (vertex / BLOCK as u32, 1 << (vertex as usize % BLOCK));
+    match list.binary_search_by_key(&block, |listed| listed.block) {
+        Ok(at) => {
+            list[at].vertices |= bit;
+            list[at].parts |= parts;
+        }
+        Err(at) => list.insert(at, Listed { block, vertices: bit, parts }),
+    }
+}
+
+/// Takes a vertex out of a list.
+pub fn unname(list: &mut Vec<Listed>, vertex: VertexId) {
+    let (block, bit) = (vertex / BLOCK as u32, 1 << (vertex as usize % BLOCK));
+    if let Ok(at) = list.binary_search_by_key(&block, |listed| listed.block) {
+        list[at].vertices &= !bit;
+        if list[at].vertices == 0 {
+            list.remove(at);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_square_holds_the_points_between_its_corners_on_both_sides_of_the_origin() {
+        for x in [[0.0, 0.0], [-0.1, 7.9], [123.4, -987.6], [-4e6, 4e6]] {
+            let [low, high] = corners(square(x, 2.5), 2.5);
+            assert!((0..2).all(|k| low[k] <= x[k] && x[k] < high[k]), "{x:?} {low:?} {high:?}");
+        }
+    }
+
+    #[test]
+    fn the_squares_near_a_point_are_those_that_its_disc_meets() {
+        let near: Vec<_> = squares_near([0.2, 3.0], 1.5, 2.0).map(|(square, _)| square).collect();
+        let expected =
+            [[-1.0, 1.5], [0.5, 1.5], [-1.0, 2.5], [0.5, 2.5], [-1.0, 4.5], [0.5, 4.5]].map(|x| square(x, 2.0));
+        assert_eq!(near, expected);
+    }
+
+    #[test]
+    fn lists_stay_ascending_and_lose_what_is_taken_out() {
+        let mut squares = Squares::default();
+        assert!(squares.get(3).is_none() && squares.get_mut(3).is_none());
+        for (vertex, parts) in [(35, 1), (2, 2), (33, 4), (0, 2), (900, 8)] {
+            name(squares.make(3), vertex, parts);
+        }
+        let listed = |block, vertices, parts| Listed { block, vertices, parts };
+        let (first, last) = (listed(0, 0b101, 2), listed(56, 0b10000, 8));
+        assert_eq!(squares.get(3), Some(&[first, listed(2, 0b1010, 5), last][..]));
+        unname(squares.make(3), 900);
+        unname(squares.make(3), 35);
+        assert_eq!(squares.get(3), Some(&[first, listed(2, 0b10, 5)][..]));
+    }
+
+    #[test]
+    fn a_point_is_near_to_the_parts_that_its_disc_meets() {
+        let side = 8.0;
+        let here = [0.0; 2];
+        assert_eq!(parts_near(here, [1.0, 1.0], 0.9, side), 1);
+        assert_eq!(parts_near(here, [-3.0, 1.0], 3.1, side), 1);
+        assert_eq!(parts_near(here, [1.9, 1.9], 0.12, side), 0b0001_0011, "the corner is farther");
+        assert_eq!(parts_near(here, [4.0, 4.0], 6.0, side), u16::MAX);
+        for i in 0..400 {
+            let x = [0.02 * f64::from(i), 8.0 - 0.019 * f64::from(i + 1)];
+            assert_eq!(parts_near(here, x, 0.0, side) & part_of(x, side), part_of(x, side), "{x:?}");
+        }
+        assert_eq!(part_of([-1.0, -7.0], side), 1 << 3);
+    }
+}

@@ -123,6 +123,11 @@ pub fn give_birth(
     else {
         return;
     };
+    // Else each write would mark the change of every cone: births would cost their number squared.
+    let (status, site, position) =
+        (status.bypass_change_detection(), site.bypass_change_detection(), position.bypass_change_detection());
+    let (velocity, spring, journey) =
+        (velocity.bypass_change_detection(), spring.bypass_change_detection(), journey.bypass_change_detection());
     for &(_, index) in due {
         let i = index as usize;
         let heading = match origins[i].heading {

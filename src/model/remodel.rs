@@ -150,6 +150,11 @@ impl Remodelling<'_, '_> {
         else {
             return;
         };
+        // Else each write would mark the change of every cone.
+        let (identity, status, site) =
+            (identity.bypass_change_detection(), status.bypass_change_detection(), site.bypass_change_detection());
+        let (position, velocity) = (position.bypass_change_detection(), velocity.bypass_change_detection());
+        let (spring, journey) = (spring.bypass_change_detection(), journey.bypass_change_detection());
         if i < identity.len() {
             let cone = Altered {
                 status: &mut status[i],

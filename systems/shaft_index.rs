@@ -336,8 +336,8 @@ fn tell(model: &mut ModelBuilder, reach: f64, search: Search) {
     plan.work(PART, Work::EvenSegment, even, Each::ConeStage);
 }
 
-/// Segments within a square of half side `reach` (µm) about a cone, if half of the axons had gone before it and were evenly spread
-/// over the longer side of the box of all births, widened by the reach.
+/// Segments within a square of half side `reach` (µm) about a cone, if half of the way of all axons lay before it and were evenly spread
+/// over the longer side of the box of all births, widened by the reach, times its shorter side and the way of one axon.
 fn evenly_spread(world: &mut World, reach: f64) -> f64 {
     let mut origins = world.query::<&Origin>();
     let tissue = world.resource::<Tissue>();
@@ -347,8 +347,12 @@ fn evenly_spread(world: &mut World, reach: f64) -> f64 {
         (low, high) = (low.inf(&at), high.sup(&at));
     }
     let shafts = world.resource::<Shafts>();
-    let width = (high - low).max().max(0.0) + 2.0 * reach;
-    0.5 * shafts.count() as f64 / width * (2.0 * reach).powi(2) / shafts.mean_segment()
+    let clock = world.resource::<Clock>();
+    let fastest = world.resource::<Populations>().0.iter().map(|population| population.speed).fold(0.0, f64::max);
+    let (extent, way) = (high - low, fastest * clock.grid.hours(clock.end));
+    let (width, depth) = (extent.max().max(0.0) + 2.0 * reach, extent.x.min(extent.y).max(0.0));
+    let abreast = if way > 0.0 { way / (depth + way) } else { 1.0 };
+    0.5 * shafts.count() as f64 / width * (2.0 * reach).powi(2) / shafts.mean_segment() * abreast
 }
 
 /// All vertices within a margin of a square, ascending.

@@ -18,6 +18,7 @@ use tropism::prelude::Roster;
 use tropism::scenario::load::Request;
 use tropism::study::accuracy::find;
 use tropism::study::laboratory::{Laboratory, chaotic, cones, root_mean_square, run_until};
+use tropism::study::run::RunError;
 use tropism::systems;
 
 const REPETITIONS: usize = 3;
@@ -64,9 +65,13 @@ fn main() {
             scope.spawn(|| {
                 let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a thread");
                 while let Some(number) = numbers.at(next.fetch_add(1, Ordering::Relaxed)) {
-                    let row = pool.install(|| measured(number, &folder));
-                    println!("{}", row.line());
-                    rows.lock().expect("no panic before").push(row);
+                    match pool.install(|| measured(number, &folder)) {
+                        Ok(row) => {
+                            println!("{}", row.line());
+                            rows.lock().expect("no panic before").push(row);
+                        }
+                        Err(refusal) => println!("{number:>5} is refused: {refusal}"),
+                    }
                 }
             });
         }
@@ -156,7 +161,8 @@ struct Bench<'a> {
     duration: f64,
 }
 
-fn measured(number: u64, folder: &Path) -> Row {
+/// Measures a scene, or says why it cannot be run: a matrix may have no equilibrium at its full load.
+fn measured(number: u64, folder: &Path) -> Result<Row, RunError> {
     let (scene, asked) = scenes::scene(number);
     let path = folder.join(format!("{number}.json"));
     std::fs::write(&path, scene.to_string()).expect("a file");
@@ -164,7 +170,7 @@ fn measured(number: u64, folder: &Path) -> Row {
     let request = Request { path, without: Vec::new(), set: Vec::new() };
     let laboratory = Laboratory::new(&request, &roster);
     let start = cpu_seconds();
-    let found = find(&laboratory).unwrap_or_else(|error| panic!("scene {number}: {error}")).expect("an accuracy");
+    let found = find(&laboratory)?.expect("an accuracy");
     let pilot_seconds = cpu_seconds() - start;
     let key = |name: &str| {
         let value = found.set.iter().find_map(|key| key.strip_prefix(name)).expect("a key that was found");
@@ -175,15 +181,15 @@ fn measured(number: u64, folder: &Path) -> Row {
         found.set.iter().filter(|key| !key.contains("mesh_size=") && !key.contains("step=")).cloned().collect();
     let duration = scene["time"]["duration"].as_f64().expect("a duration");
     let bench = Bench { laboratory, others, duration };
-    let (reference, finer) = bench.reference(chosen, asked, &scene);
-    let (tips, seconds) = bench.run(chosen, &[]);
+    let (reference, finer) = bench.reference(chosen, asked, &scene)?;
+    let (tips, seconds) = bench.run(chosen, &[])?;
     let reached = error(&tips, &reference);
     let split =
         tips.iter().zip(&reference).filter(|(a, b)| b.1 > 0.0 && (a.0 - b.0).norm() / b.1 > 10.0 * asked).count();
     let best = bench.best(chosen, seconds, asked, &reference);
-    let (seconds, best_seconds) = bench.compared(chosen, best);
+    let (seconds, best_seconds) = bench.compared(chosen, best)?;
     let estimated = found.estimated;
-    Row {
+    Ok(Row {
         number,
         asked,
         reached,
@@ -196,12 +202,12 @@ fn measured(number: u64, folder: &Path) -> Row {
         pilot_seconds,
         finer,
         split,
-    }
+    })
 }
 
 impl Bench<'_> {
     /// Tips at the end, and the seconds of assembly and run.
-    fn run(&self, fixed: Fixed, more: &[String]) -> (Tips, f64) {
+    fn run(&self, fixed: Fixed, more: &[String]) -> Result<(Tips, f64), RunError> {
         let mut set = self.others.clone();
         set.push(format!("/tissue/mesh_size={:e}", fixed.mesh));
         set.push(format!("/time/step={:e}", fixed.step));
@@ -209,14 +215,14 @@ impl Bench<'_> {
         let without = chaotic(&self.laboratory.scene().expect("a scene"));
         let loaded = self.laboratory.load(&without, &set).expect("a scene");
         let start = cpu_seconds();
-        let mut simulation = self.laboratory.assemble(&loaded).expect("a simulation");
-        run_until(&mut simulation, self.duration).expect("a run");
+        let mut simulation = self.laboratory.assemble(&loaded)?;
+        run_until(&mut simulation, self.duration)?;
         let seconds = cpu_seconds() - start;
-        (cones(&simulation).iter().map(|cone| (cone.position, cone.length)).collect(), seconds)
+        Ok((cones(&simulation).iter().map(|cone| (cone.position, cone.length)).collect(), seconds))
     }
 
     /// Tips of the reference, and how many times its mesh is finer than the choice.
-    fn reference(&self, chosen: Fixed, asked: f64, scene: &serde_json::Value) -> (Tips, f64) {
+    fn reference(&self, chosen: Fixed, asked: f64, scene: &serde_json::Value) -> Result<(Tips, f64), RunError> {
         let outline = &scene["tissue"]["outline"];
         let corner = &outline["polygon"]["outer"]["points"][2];
         let side = |name: &str, k: usize| outline["rectangle"][name].as_f64().or(corner[k].as_f64()).expect("a side");
@@ -226,15 +232,15 @@ impl Bench<'_> {
             Some(_) => vec![format!("/matrix/tolerance={:e}", 1e-4 * asked)],
             None => Vec::new(),
         };
-        (self.run(Fixed { mesh, step: chosen.step / 16.0 }, &more).0, chosen.mesh / mesh)
+        Ok((self.run(Fixed { mesh, step: chosen.step / 16.0 }, &more)?.0, chosen.mesh / mesh))
     }
 
-    /// The cheapest fixed setting that meets the accuracy; the choice itself if none is cheaper.
+    /// The cheapest fixed setting that can be run and meets the accuracy; the choice itself if none is cheaper.
     fn best(&self, chosen: Fixed, seconds: f64, asked: f64, reference: &Tips) -> Fixed {
         let (mut best, mut least) = (chosen, seconds);
         for mesh in MESHES.rev().map(|k| chosen.mesh * 2f64.powf(0.5 * f64::from(k))) {
             for step in STEPS.rev().map(|k| chosen.step * 2f64.powi(k)).filter(|step| *step < 0.25 * self.duration) {
-                let (tips, seconds) = self.run(Fixed { mesh, step }, &[]);
+                let Ok((tips, seconds)) = self.run(Fixed { mesh, step }, &[]) else { break };
                 if error(&tips, reference) <= asked && seconds < least {
                     (best, least) = (Fixed { mesh, step }, seconds);
                 }
@@ -247,16 +253,17 @@ impl Bench<'_> {
     }
 
     /// Seconds of the choice and of the best, in turn, median of each.
-    fn compared(&self, chosen: Fixed, best: Fixed) -> (f64, f64) {
-        let pairs: Vec<(f64, f64)> =
-            (0..REPETITIONS).map(|_| (self.run(chosen, &[]).1, self.run(best, &[]).1)).collect();
+    fn compared(&self, chosen: Fixed, best: Fixed) -> Result<(f64, f64), RunError> {
+        let pairs = (0..REPETITIONS)
+            .map(|_| Ok((self.run(chosen, &[])?.1, self.run(best, &[])?.1)))
+            .collect::<Result<Vec<(f64, f64)>, RunError>>()?;
         let median = |pick: fn(&(f64, f64)) -> f64| {
             let mut seconds: Vec<f64> = pairs.iter().map(pick).collect();
             seconds.sort_by(f64::total_cmp);
             seconds[seconds.len() / 2]
         };
         let same = chosen.mesh == best.mesh && chosen.step == best.step;
-        (median(|pair| pair.0), if same { median(|pair| pair.0) } else { median(|pair| pair.1) })
+        Ok((median(|pair| pair.0), if same { median(|pair| pair.0) } else { median(|pair| pair.1) }))
     }
 }
 

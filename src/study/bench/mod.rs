@@ -120,11 +120,13 @@ fn row(laboratory: &Laboratory, axons: u64, without_plain: &mut Option<String>) 
     let loaded = laboratory.load(&[], &[format!("{KEY}={axons}")])?;
     let repetitions = if axons > MOST_REPEATED { 1 } else { laboratory.repetitions };
     let (mut own, mut plain, mut difference) = (Vec::new(), Vec::new(), None);
-    let mut last = None;
+    let (mut last, mut bytes) = (None, None);
     for _ in 0..repetitions {
         drop(last.take());
         let timed = run(laboratory, &loaded)?;
         own.push(cone_seconds(&timed.phases));
+        // What one run has given back, the next takes again: the first tells.
+        bytes = bytes.or(timed.bytes);
         if axons <= MOST_PLAIN {
             match run_plain(laboratory, &loaded, &timed.simulation)? {
                 Ok((seconds, apart)) => {
@@ -139,7 +141,7 @@ fn row(laboratory: &Laboratory, axons: u64, without_plain: &mut Option<String>) 
     let timed = last.ok_or_else(|| RunError::Internal("nothing was timed".into()))?;
     let seconds = Seconds::of(&own).ok_or_else(|| RunError::Internal("nothing was timed".into()))?;
     let plain_seconds = Seconds::of(&plain);
-    let Timed { simulation, phases, marks, bytes } = timed;
+    let Timed { simulation, phases, marks, .. } = timed;
     let world = simulation.world();
     let Counters { cone_steps, .. } = simulation.counters();
     let cone_hours = cone_steps as f64 * loaded.scene.time.step.0;

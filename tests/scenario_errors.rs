@@ -196,7 +196,7 @@ fn each_bad_value_gets_its_own_sentence() {
         ),
         (
             r#"{"populations": {"a": {"heading": "inner_norml"}}}"#,
-            r#"/populations/a/heading: "inner_norml" is not allowed here; did you mean "inner_normal"? (allowed: "inner_normal", an angle such as 1 or "1 deg")"#,
+            r#"/populations/a/heading: "inner_norml" is not allowed here; did you mean "inner_normal"? (allowed: "inner_normal", "random", an angle such as 1 or "1 deg")"#,
         ),
         (
             r#"{"populations": {"a": {"heading": "3 um"}}}"#,

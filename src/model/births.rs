@@ -91,6 +91,31 @@ impl Altered<'_> {
     }
 }
 
+/// The same of all cones, in their order. Taken past the detection of changes: else each write would mark the change of every cone, and
+/// births would cost their number times that.
+pub(super) struct AlteredColumns<'a> {
+    pub(super) status: &'a mut [Status],
+    pub(super) site: &'a mut [Site],
+    pub(super) position: &'a mut [Position],
+    pub(super) velocity: &'a mut [Velocity],
+    pub(super) spring: &'a mut [SpringState],
+    pub(super) journey: &'a mut [Journey],
+}
+
+impl AlteredColumns<'_> {
+    /// One of them.
+    pub(super) fn at(&mut self, i: usize) -> Altered<'_> {
+        Altered {
+            status: &mut self.status[i],
+            site: &mut self.site[i],
+            position: &mut self.position[i],
+            velocity: &mut self.velocity[i],
+            spring: &mut self.spring[i],
+            journey: &mut self.journey[i],
+        }
+    }
+}
+
 type Unborn = (
     &'static GrowthCone,
     &'static Origin,
@@ -123,27 +148,22 @@ pub fn give_birth(
     else {
         return;
     };
-    // Else each write would mark the change of every cone: births would cost their number squared.
-    let (status, site, position) =
-        (status.bypass_change_detection(), site.bypass_change_detection(), position.bypass_change_detection());
-    let (velocity, spring, journey) =
-        (velocity.bypass_change_detection(), spring.bypass_change_detection(), journey.bypass_change_detection());
+    let mut columns = AlteredColumns {
+        status: status.bypass_change_detection(),
+        site: site.bypass_change_detection(),
+        position: position.bypass_change_detection(),
+        velocity: velocity.bypass_change_detection(),
+        spring: spring.bypass_change_detection(),
+        journey: journey.bypass_change_detection(),
+    };
     for &(_, index) in due {
         let i = index as usize;
         let heading = match origins[i].heading {
             FirstHeading::InnerNormal(facet) => inner_normal(&tissue, &configuration.coordinates, facet),
             FirstHeading::Fixed(heading) => heading,
         };
-        let newborn = Altered {
-            status: &mut status[i],
-            site: &mut site[i],
-            position: &mut position[i],
-            velocity: &mut velocity[i],
-            spring: &mut spring[i],
-            journey: &mut journey[i],
-        };
         let place = (origins[i].site, configuration.position(&tissue.mesh, origins[i].site));
-        newborn.begin(place, heading, cones[i].speed, cones[i].birth_time);
+        columns.at(i).begin(place, heading, cones[i].speed, cones[i].birth_time);
         if adaptive.is_none() {
             let at = tissue.reference_position(origins[i].site);
             shafts.start(i, origins[i].site, [at.x, at.y], cones[i].birth_time);

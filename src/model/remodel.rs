@@ -1,7 +1,7 @@
 //! What mechanisms of [`Phase::Remodel`](super::schedule::Phase::Remodel) may do to what is laid: let a branch sprout, draw a
 //! growth cone back along its shaft, lay a shaft anew. They act at the end of a step, on the state reached.
 
-use super::births::Altered;
+use super::births::{Altered, AlteredColumns};
 use super::clock::Clock;
 use super::components::{GrowthCone, Journey, Position, Site, SpringState, Status, Velocity};
 use super::shafts::{ShaftPoint, Shafts, VertexId};
@@ -150,21 +150,17 @@ impl Remodelling<'_, '_> {
         else {
             return;
         };
-        // Else each write would mark the change of every cone.
-        let (identity, status, site) =
-            (identity.bypass_change_detection(), status.bypass_change_detection(), site.bypass_change_detection());
-        let (position, velocity) = (position.bypass_change_detection(), velocity.bypass_change_detection());
-        let (spring, journey) = (spring.bypass_change_detection(), journey.bypass_change_detection());
+        let identity = identity.bypass_change_detection();
+        let mut columns = AlteredColumns {
+            status: status.bypass_change_detection(),
+            site: site.bypass_change_detection(),
+            position: position.bypass_change_detection(),
+            velocity: velocity.bypass_change_detection(),
+            spring: spring.bypass_change_detection(),
+            journey: journey.bypass_change_detection(),
+        };
         if i < identity.len() {
-            let cone = Altered {
-                status: &mut status[i],
-                site: &mut site[i],
-                position: &mut position[i],
-                velocity: &mut velocity[i],
-                spring: &mut spring[i],
-                journey: &mut journey[i],
-            };
-            act(&mut identity[i], cone);
+            act(&mut identity[i], columns.at(i));
         }
     }
 

@@ -216,14 +216,14 @@ fn cost(world: &World) -> Cost {
         shaft_vertices: world.resource::<Shafts>().vertex_count(),
         share: seconds.iter().map(|(phase, s)| (*phase, s / total)).collect(),
         seconds,
-        peak_memory_mib: peak_memory(),
+        peak_memory_mib: memory_mib("VmHWM:"),
     }
 }
 
-/// Largest resident set of this process (MiB), where the system tells.
-fn peak_memory() -> Option<f64> {
+/// Resident memory of this process (MiB), where the system tells: `VmRSS:` now, `VmHWM:` the largest so far.
+pub fn memory_mib(name: &str) -> Option<f64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
-    let line = status.lines().find(|line| line.starts_with("VmHWM:"))?;
+    let line = status.lines().find(|line| line.starts_with(name))?;
     let kib: f64 = line.split_whitespace().nth(1)?.parse().ok()?;
     Some(kib / 1024.0)
 }

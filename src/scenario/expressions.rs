@@ -5,7 +5,7 @@
 //! those before it. What is replaced is the text alone: keys, units and ranges are checked afterwards, as if the value had been
 //! written there.
 
-use serde_json::{Map, Number, Value};
+use serde_json::{Number, Value};
 
 use super::suggest::advice;
 use crate::model::violation::{Violation, pointer_token};
@@ -35,13 +35,12 @@ pub fn evaluate(document: &mut Value, problems: &mut Vec<Violation>) {
 }
 
 fn walk(value: &mut Value, pointer: &str, known: &Parameters, problems: &mut Vec<Violation>) {
-    let keys = |object: &mut Map<String, Value>, problems: &mut Vec<Violation>| {
-        for (key, member) in object {
-            walk(member, &format!("{pointer}{}", pointer_token(key)), known, problems);
-        }
-    };
     match value {
-        Value::Object(object) => keys(object, problems),
+        Value::Object(object) => {
+            for (key, member) in object {
+                walk(member, &format!("{pointer}{}", pointer_token(key)), known, problems);
+            }
+        }
         Value::Array(entries) => {
             for (i, entry) in entries.iter_mut().enumerate() {
                 walk(entry, &format!("{pointer}/{i}"), known, problems);
@@ -107,17 +106,23 @@ impl Reader<'_> {
         }
     }
 
-    fn sum(&mut self) -> Result<f64, String> {
+    /// Reads what stands inside something else.
+    fn inside(&mut self, read: impl FnOnce(&mut Self) -> Result<f64, String>) -> Result<f64, String> {
         self.depth += 1;
         if self.depth > DEEPEST {
             return Err(format!("more than {DEEPEST} parentheses, signs or powers inside each other"));
         }
+        let value = read(self)?;
+        self.depth -= 1;
+        Ok(value)
+    }
+
+    fn sum(&mut self) -> Result<f64, String> {
         let mut value = self.product()?;
         while let Some(sign) = self.take("+-") {
             let other = self.product()?;
             value = if sign == '+' { value + other } else { value - other };
         }
-        self.depth -= 1;
         Ok(value)
     }
 
@@ -140,12 +145,7 @@ impl Reader<'_> {
     fn signed(&mut self) -> Result<f64, String> {
         match self.take("+-") {
             Some(sign) => {
-                self.depth += 1;
-                if self.depth > DEEPEST {
-                    return Err(format!("more than {DEEPEST} parentheses, signs or powers inside each other"));
-                }
-                let value = self.signed()?;
-                self.depth -= 1;
+                let value = self.inside(Self::signed)?;
                 Ok(if sign == '-' { -value } else { value })
             }
             None => self.power(),
@@ -157,18 +157,13 @@ impl Reader<'_> {
         if self.take("^").is_none() {
             return Ok(base);
         }
-        self.depth += 1;
-        if self.depth > DEEPEST {
-            return Err(format!("more than {DEEPEST} parentheses, signs or powers inside each other"));
-        }
-        let exponent = self.signed()?;
-        self.depth -= 1;
+        let exponent = self.inside(Self::signed)?;
         Ok(base.powf(exponent))
     }
 
     fn atom(&mut self) -> Result<f64, String> {
         if self.take("(").is_some() {
-            let value = self.sum()?;
+            let value = self.inside(Self::sum)?;
             self.demand(')')?;
             return Ok(value);
         }
@@ -199,7 +194,7 @@ impl Reader<'_> {
         let mut values = [0.0; N];
         for (i, value) in values.iter_mut().enumerate() {
             self.demand(if i == 0 { '(' } else { ',' })?;
-            *value = self.sum()?;
+            *value = self.inside(Self::sum)?;
         }
         self.demand(')')?;
         Ok(values)

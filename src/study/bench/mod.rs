@@ -15,6 +15,7 @@ use crate::model::shafts::Shafts;
 use crate::model::stopwatch::Stopwatch;
 use crate::model::tissue::Configuration;
 use crate::model::violation::pointer_token;
+use crate::record::summary::memory_mib;
 use crate::scenario::load::Loaded;
 use crate::simulation::Simulation;
 use plain::PlainLoop;
@@ -29,6 +30,8 @@ const SCENERY: [&str; 7] = ["mesh", "assembly", "matrix", "cues", "matrix motion
 const MOST_PLAIN: u64 = 200_000;
 /// With more axons than this each run is timed once.
 const MOST_REPEATED: u64 = 50_000;
+/// Bytes of a MiB.
+const MIB: f64 = 1_048_576.0;
 /// Looks at the clock during a run.
 const LOOKS: usize = 8;
 
@@ -128,7 +131,7 @@ fn row(laboratory: &Laboratory, axons: u64, without_plain: &mut Option<String>) 
         // What one run has given back, the next takes again: the first tells.
         bytes = bytes.or(timed.bytes);
         if axons <= MOST_PLAIN {
-            match run_plain(laboratory, &loaded, &timed.simulation)? {
+            match run_plain(laboratory, (axons, &loaded), &timed.simulation)? {
                 Ok((seconds, apart)) => {
                     plain.push(seconds);
                     difference = Some(apart);
@@ -173,7 +176,7 @@ fn cone_seconds(phases: &BTreeMap<&'static str, f64>) -> f64 {
 
 /// Assembles a scene and runs it to its end.
 fn run(laboratory: &Laboratory, loaded: &Loaded) -> Result<Timed, RunError> {
-    let before = resident_bytes();
+    let before = memory_mib("VmRSS:");
     let mut simulation = laboratory.assemble(loaded)?;
     let end = simulation.world().resource::<Clock>().end;
     let mut marks = Vec::new();
@@ -187,7 +190,7 @@ fn run(laboratory: &Laboratory, loaded: &Loaded) -> Result<Timed, RunError> {
         }
     }
     simulation.lap("record");
-    let bytes = resident_bytes().zip(before).map(|(after, before)| after - before);
+    let bytes = memory_mib("VmRSS:").zip(before).map(|(after, before)| (after - before) * MIB);
     let phases = simulation.world().resource::<Stopwatch>().seconds().clone();
     Ok(Timed { simulation, phases, marks, bytes })
 }
@@ -195,14 +198,13 @@ fn run(laboratory: &Laboratory, loaded: &Loaded) -> Result<Timed, RunError> {
 /// Seconds of the plain loop and the largest distance of its cones from those of a simulation (µm), or why it cannot run.
 fn run_plain(
     laboratory: &Laboratory,
-    loaded: &Loaded,
+    (axons, loaded): (u64, &Loaded),
     simulation: &Simulation,
 ) -> Result<Result<(f64, f64), String>, RunError> {
     let duration = loaded.scene.time.duration.0;
     let late =
         |name: &String| format!("/populations{}/births={{\"at\": {}}}", pointer_token(name), duration * (1.0 - 1e-9));
     let births: Vec<String> = loaded.scene.populations.keys().map(late).collect();
-    let axons = loaded.scene.populations.values().map(|population| population.count).sum::<u64>();
     let empty = laboratory.load(&[], &[births, vec![format!("{KEY}={axons}")]].concat())?;
     let mut stage = laboratory.assemble(&empty)?;
     let mut plain = match PlainLoop::new(loaded, simulation.world(), stage.world()) {
@@ -220,12 +222,4 @@ fn run_plain(
 /// The power p of y ~ x^p through some points.
 fn fitted_power(points: &[[f64; 2]]) -> Option<f64> {
     slope(&points.iter().map(|point| point.map(f64::ln)).collect::<Vec<_>>())
-}
-
-/// Resident memory of this process (bytes), where the system tells.
-fn resident_bytes() -> Option<f64> {
-    let status = std::fs::read_to_string("/proc/self/status").ok()?;
-    let line = status.lines().find(|line| line.starts_with("VmRSS:"))?;
-    let kib: f64 = line.split_whitespace().nth(1)?.parse().ok()?;
-    Some(1024.0 * kib)
 }

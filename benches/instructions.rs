@@ -3,7 +3,8 @@
 //! The program runs itself under callgrind, which counts the instructions of N steps of a small scene after N others, on one thread, and
 //! nothing of what happens before. Twice so: with the roster that comes with the program, and with one that has the scene's mechanisms
 //! only. Off is absence, so both must agree: within 0.1 %, or the program ends with 1. Then a table: one mechanism after the other joins
-//! the scene.
+//! the scene. What the largest scene takes may not exceed the number stored in `instructions.json` by more than 3 %; where it is less by
+//! as much, the number is to be stored anew (`-- --store`).
 
 use serde_json::{Value, json};
 use std::process::{Command, ExitCode};
@@ -16,6 +17,10 @@ use tropism::systems;
 const STEPS: usize = 30;
 /// Largest difference of the two rosters, as a share.
 const ALLOWED: f64 = 1e-3;
+/// Growth over the stored number that is allowed, as a share.
+const GROWTH: f64 = 0.03;
+/// Where the number is stored.
+const STORED: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/benches/instructions.json");
 /// Marks a run that valgrind watches.
 const CHILD: &str = "--watched";
 
@@ -23,7 +28,7 @@ fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().collect();
     match arguments.iter().position(|argument| argument == CHILD) {
         Some(place) => watched(&arguments[place + 1..]),
-        None => compare(),
+        None => compare(arguments.iter().any(|argument| argument == "--store")),
     }
 }
 
@@ -124,9 +129,10 @@ fn per_cone_step(kind: &str, number: usize) -> Result<f64, String> {
     }
 }
 
-fn compare() -> ExitCode {
-    match report() {
-        Ok(equal) => ExitCode::from(u8::from(!equal)),
+fn compare(store: bool) -> ExitCode {
+    let judged = report().and_then(|(equal, now)| Ok(equal & if store { keep(now)? } else { within(now)? }));
+    match judged {
+        Ok(passed) => ExitCode::from(u8::from(!passed)),
         Err(message) => {
             eprintln!("{message}");
             ExitCode::from(2)
@@ -134,8 +140,29 @@ fn compare() -> ExitCode {
     }
 }
 
-/// Prints both tables; whether absent mechanisms cost nothing.
-fn report() -> Result<bool, String> {
+/// Stores the number of the largest scene.
+fn keep(now: f64) -> Result<bool, String> {
+    let stored = json!({ "instructions_a_cone_step": now.round() });
+    std::fs::write(STORED, format!("{stored:#}\n")).map_err(|error| format!("{STORED}: {error}"))?;
+    Ok(true)
+}
+
+/// Whether the number of the largest scene keeps to the stored one.
+fn within(now: f64) -> Result<bool, String> {
+    let text = std::fs::read_to_string(STORED).map_err(|error| format!("{STORED}: {error}"))?;
+    let stored = serde_json::from_str::<Value>(&text).ok().and_then(|value| value["instructions_a_cone_step"].as_f64());
+    let stored = stored.ok_or_else(|| format!("{STORED}: no instructions_a_cone_step"))?;
+    let growth = now / stored - 1.0;
+    println!("\n{now:.0} instructions a cone-step with all of them, stored {stored:.0}: {:+.2} %", 100.0 * growth);
+    if growth.abs() > GROWTH {
+        let advice = if growth > 0.0 { "find out why" } else { "store it by -- --store" };
+        eprintln!("that is more than {:.0} % away: {advice}", 100.0 * GROWTH);
+    }
+    Ok(growth <= GROWTH)
+}
+
+/// Prints both tables: whether absent mechanisms cost nothing, and what the largest scene takes.
+fn report() -> Result<(bool, f64), String> {
     println!("instructions a cone-step; 40 cones, {STEPS} steps after {STEPS}, one thread");
     println!("{:>12} {:>12} {:>10}   mechanisms of the scene", "own roster", "whole roster", "difference");
     let mut equal = true;
@@ -158,5 +185,5 @@ fn report() -> Result<bool, String> {
     if !equal {
         eprintln!("mechanisms that a scene does not have cost it more than {:.1} % of its step", 100.0 * ALLOWED);
     }
-    Ok(equal)
+    Ok((equal, before))
 }

@@ -18,9 +18,9 @@
 
 extern crate self as tropism;
 
-mod cli;
 mod new_mechanism;
 pub mod prelude;
+mod terminal;
 
 #[cfg(not(feature = "rooms"))]
 mod model;
@@ -66,5 +66,5 @@ mod systems;
 #[path = "../systems/mod.rs"]
 pub mod systems;
 
-pub use cli::run;
 pub use systems::standard;
+pub use terminal::run;

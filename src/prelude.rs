@@ -20,6 +20,7 @@ pub use crate::model::components::{
 pub use crate::model::cones::{Cone, Cones, ConesWith};
 pub use crate::model::growth::{Growth, Population, Populations, ShaftPopulations, Targets};
 pub use crate::model::health::{Counters, Health};
+pub use crate::model::keep::{Damage, Keep, KeptBytes};
 pub use crate::model::material_law::{MaterialChoice, MaterialLaw, Materials};
 pub use crate::model::mechanism::{Demands, Facts, InstallError, Law, Mechanism, ModelBuilder, Roster, unknown_name};
 pub use crate::model::plan::{Each, Plan, Work};
@@ -42,4 +43,4 @@ pub use crate::model::violation::{Violation, Violations};
 pub use crate::numerics::law_check::{LawDefects, law_defects};
 pub use crate::numerics::material::{Lame, Material, Tensor};
 pub use crate::systems::cue_fields::{CueFields, CueSample};
-pub use crate::{keys, quantity};
+pub use crate::{kept, keys, quantity};

@@ -103,7 +103,7 @@ fn repel(
     let (weight, range) = (law.weight.0, law.range.0);
     cones.for_each(|cone, spring| {
         for (facets, bounds) in tissue.edges.iter().zip(&boxes.edges) {
-            if distance_to_box(cone.position, &bounds.whole) < RANGES * range {
+            if squared_distance_to_box(cone.position, &bounds.whole) < (RANGES * range).powi(2) {
                 let edge = (facets.as_slice(), bounds.runs.as_slice());
                 spring.pull += edge_pull(&tissue, &configuration, edge, cone.position, range) * weight;
             }
@@ -111,9 +111,27 @@ fn repel(
     });
 }
 
-fn distance_to_box(x: Vector3<f64>, bounds: &Bounds) -> f64 {
+fn squared_distance_to_box(x: Vector3<f64>, bounds: &Bounds) -> f64 {
     let outside = |k: usize| (bounds[0][k] - x[k]).max(x[k] - bounds[1][k]).max(0.0);
-    (outside(0).powi(2) + outside(1).powi(2)).sqrt()
+    outside(0).powi(2) + outside(1).powi(2)
+}
+
+/// Of the first facet that is nearest to x: squared distance (µm²), from its nearest point to x, and along it.
+fn nearest_of(
+    facets: &[BorderFacet],
+    tissue: &Tissue,
+    configuration: &Configuration,
+    x: Vector3<f64>,
+) -> (f64, Vector3<f64>, Vector3<f64>) {
+    let mut best = (f64::INFINITY, Vector3::zeros(), Vector3::zeros());
+    for facet in facets {
+        let [a, b] = facet_ends(tissue, configuration, *facet);
+        let share = ((x - a).dot(&(b - a)) / (b - a).norm_squared()).clamp(0.0, 1.0);
+        let from_facet = x - (a + (b - a) * share);
+        let squared = from_facet.norm_squared();
+        best = if squared < best.0 { (squared, from_facet, b - a) } else { best };
+    }
+    best
 }
 
 /// n_in exp(−d/ℓ) of one edge at x: n_in from the edge's nearest point to x (the facet's inner normal on the edge itself).
@@ -124,21 +142,18 @@ fn edge_pull(
     x: Vector3<f64>,
     range: f64,
 ) -> Vector3<f64> {
-    let (mut nearest, mut away, mut along) = (f64::INFINITY, Vector3::zeros(), Vector3::zeros());
-    for (facets, bounds) in facets.chunks(RUN).zip(runs) {
+    let bounded = runs.iter().map(|bounds| squared_distance_to_box(x, bounds));
+    let closest = bounded.clone().zip(0..).min_by(|a, b| a.0.total_cmp(&b.0)).map_or(0, |(_, run)| run);
+    let found = nearest_of(&facets[closest * RUN..facets.len().min((closest + 1) * RUN)], tissue, configuration, x);
+    let mut best = (f64::INFINITY, Vector3::zeros(), Vector3::zeros());
+    for (run, (facets, squared)) in facets.chunks(RUN).zip(bounded).enumerate() {
         // A hair less than the distance to the box, for rounding: what is skipped is not the nearest.
-        if distance_to_box(x, bounds).powi(2) * (1.0 - 1e-9) > nearest {
-            continue;
-        }
-        for facet in facets {
-            let [a, b] = facet_ends(tissue, configuration, *facet);
-            let share = ((x - a).dot(&(b - a)) / (b - a).norm_squared()).clamp(0.0, 1.0);
-            let from_facet = x - (a + (b - a) * share);
-            if from_facet.norm_squared() < nearest {
-                (nearest, away, along) = (from_facet.norm_squared(), from_facet, b - a);
-            }
+        if squared * (1.0 - 1e-9) <= found.0 {
+            let other = if run == closest { found } else { nearest_of(facets, tissue, configuration, x) };
+            best = if other.0 < best.0 { other } else { best };
         }
     }
+    let (nearest, away, along) = best;
     let distance = nearest.sqrt();
     let inward = if distance > 0.0 { away / distance } else { Vector3::new(-along.y, along.x, 0.0).normalize() };
     inward * (-distance / range).exp()

@@ -56,6 +56,8 @@ struct Budding {
     count: u64,
 }
 
+kept! { struct Budding { next, count } }
+
 /// What the draws are keyed by besides cone and count, and the number of the cue.
 #[derive(Debug, Clone, Copy, Resource)]
 struct Buds {
@@ -88,6 +90,7 @@ impl Mechanism for Branching {
             next: cone.birth_time + waiting_time(seed, stream, (cone.axon, 0), rate),
             count: 0,
         });
+        model.keep_of_cones::<Budding>();
         let cue = self.cue.clone();
         model.at_end(move |world| {
             let cue = cue.map(|cue| CueFields::number(world, &cue, "/cue")).transpose()?;

@@ -132,6 +132,10 @@ impl Mechanism for Chemotaxis {
     }
 
     fn install(self, model: &mut ModelBuilder) -> Result<(), InstallError> {
+        if self.receptors.is_empty() {
+            model.plan().leave_out(Self::NAME, "no receptor is given: nothing is sensed");
+            return Ok(());
+        }
         for (name, receptor) in &self.receptors {
             CueFields::demand(model, name);
             receptor.silenced_by.keys().for_each(|other| CueFields::demand(model, other));

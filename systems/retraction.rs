@@ -48,12 +48,16 @@ struct Retreat {
     left: f64,
 }
 
+kept! { struct Retreat { left } }
+
 /// When cones last drew back (h), and the number of the cue.
 #[derive(Debug, Clone, Copy, Resource)]
 struct Retreats {
     last: f64,
     cue: Option<usize>,
 }
+
+kept! { struct Retreats { last, cue } }
 
 impl Mechanism for Retraction {
     const NAME: &'static str = "retraction";
@@ -75,6 +79,7 @@ impl Mechanism for Retraction {
             CueFields::demand(model, cue);
         }
         model.attach(|_: &GrowthCone| Retreat::default());
+        model.keep_of_cones::<Retreat>().keep::<Retreats>();
         model.at_end(move |world| {
             let cue = cue.map(|cue| CueFields::number(world, &cue, "/collapse/cue")).transpose()?;
             world.insert_resource(Retreats { last: 0.0, cue });

@@ -143,7 +143,7 @@ impl ShaftIndex {
                 tell(model, reach, search);
                 model.world.resource_mut::<Shafts>().watch();
                 model.insert(ShaftIndex { search, reach, ..ShaftIndex::default() });
-                model.phase(Phase::Neighbours, index_new_vertices);
+                model.phase(Phase::Neighbours, index_new_vertices).rebuild(index_again);
             }
         }
         true
@@ -412,6 +412,17 @@ impl ShaftScene<'_> {
         }
         positions
     }
+}
+
+/// Fills the index of a run that is resumed with what it held.
+fn index_again(world: &mut World) {
+    world.resource_scope::<ShaftIndex, _>(|world, mut index| {
+        let (tissue, shafts) = (world.resource::<Tissue>(), world.resource::<Shafts>());
+        for vertex in shafts.taken() {
+            let at = tissue.reference_position(shafts.point(vertex).into());
+            index.add(vertex, [at.x, at.y], shafts.longest);
+        }
+    });
 }
 
 fn index_new_vertices(

@@ -66,12 +66,31 @@ enum Held {
     Zipper { bond: usize, forward: bool },
 }
 
+kept! { struct Node { point, held } }
+
+impl Keep for Held {
+    fn keep(&self, into: &mut Vec<u8>) {
+        match *self {
+            Self::End => None,
+            Self::Zipper { bond, forward } => Some((bond, forward)),
+        }
+        .keep(into);
+    }
+
+    fn restore(from: &mut KeptBytes) -> Result<Self, Damage> {
+        let zipper: Option<(usize, bool)> = from.read()?;
+        Ok(zipper.map_or(Self::End, |(bond, forward)| Self::Zipper { bond, forward }))
+    }
+}
+
 /// Two shafts that zip; `same` if they run the same way. Its ends are the zipper points before and after on the first shaft.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Bond {
     shafts: [u32; 2],
     same: bool,
 }
+
+kept! { struct Bond { shafts, same } }
 
 impl Bond {
     /// The other shaft, if one is bound.
@@ -93,6 +112,8 @@ pub struct Zippers {
     changed: BTreeSet<u32>,
 }
 
+kept! { struct Zippers { last, resting, lines, bonds, changed } }
+
 /// Farthest that a zipper point moves at once (µm).
 const STRIDE: f64 = 0.25;
 /// Slower than this (µm/h), a point is at rest.
@@ -113,7 +134,7 @@ impl Mechanism for Zippering {
         if self.adhesion.0 > 0.0 {
             model.phase(Phase::Remodel, zip);
         }
-        model.insert(Zippers::default()).insert_law(self);
+        model.insert(Zippers::default()).keep::<Zippers>().insert_law(self);
         Ok(())
     }
 }

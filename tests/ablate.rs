@@ -9,6 +9,7 @@ use tropism::prelude::*;
 use tropism::scenario::load::Loaded;
 use tropism::simulation::Simulation;
 use tropism::study::ablation::{Ablation, Arm, Extent, FULL, ablate, report};
+use tropism::study::report::Asked;
 use tropism::systems;
 
 fn scene() -> Value {
@@ -194,7 +195,7 @@ fn an_arm_that_fails_is_reported_while_the_others_finish() {
         let table = found.to_string();
         assert!(table.contains("without prop failed for 2 of 2 seeds; seed 5: ") && table.contains(account), "{table}");
         let folder = Folder::new();
-        report::write(&folder.0, &loaded(&scene, &roster), &found).unwrap();
+        report::write(&folder.0, Asked { loaded: &loaded(&scene, &roster), command: "" }, &found).unwrap();
         let rows = std::fs::read_to_string(folder.0.join("ablation.csv")).unwrap();
         assert!(rows.contains("\nwithout prop,failed,,,,,,,,,,,\n"), "{rows}");
     }
@@ -206,7 +207,7 @@ fn the_files_say_what_the_arms_are() {
     let loaded = loaded(&scene(), &roster);
     let found = of_loaded(&loaded, &roster, Extent { seeds: 2, pairs: false });
     let folder = Folder::new();
-    report::write(&folder.0, &loaded, &found).unwrap();
+    report::write(&folder.0, Asked { loaded: &loaded, command: "" }, &found).unwrap();
     let read = |name: &str| std::fs::read_to_string(folder.0.join(name)).unwrap();
     let document: Value = serde_json::from_str(&read("ablation.json")).unwrap();
     assert_eq!((&document["seeds"], &document["complete"]), (&json!([5, 6]), &json!(true)));
@@ -222,6 +223,11 @@ fn the_files_say_what_the_arms_are() {
     assert!(head.starts_with("arm,status,measure,unit,n [seeds],mean [unit],"), "{head}");
     assert!(table.contains("\nwithout matrix,complete,length_um.mean,um,2,") && !table.contains("NaN"));
     assert!(table.lines().all(|line| line.split(',').count() == 13));
+    let page = read("report.html");
+    assert!(
+        page.contains("id=\"recording-1\" data-label=\"without matrix\"") && page.contains("\"kind\":\"ablation\"")
+    );
+    assert_eq!(page.matches("application/octet-stream").count(), found.arms.iter().filter(|arm| arm.complete).count());
     let figure = read("figure.svg");
     assert!(figure.contains("without matrix") && !figure.contains("without cues"), "one panel an arm that ran");
     assert_eq!(&std::fs::read(folder.0.join("figure.png")).unwrap()[..8], b"\x89PNG\r\n\x1a\n");

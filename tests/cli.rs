@@ -55,7 +55,7 @@ fn refusal(scene: &Value, arguments: &[&str]) -> String {
 }
 
 #[test]
-fn a_run_leaves_its_five_files_and_ends_with_zero() {
+fn a_run_leaves_its_seven_files_and_ends_with_zero() {
     let folder = with_scene(&scene());
     let output = tropism(&folder, &["scene.json"]);
     assert_eq!(code(&output), 0, "{}", errors(&output));
@@ -63,7 +63,16 @@ fn a_run_leaves_its_five_files_and_ends_with_zero() {
     let mut files: Vec<_> =
         std::fs::read_dir(&out).unwrap().map(|f| f.unwrap().file_name().into_string().unwrap()).collect();
     files.sort();
-    assert_eq!(files, ["figure.png", "figure.svg", "manifest.json", "summary.json", "trajectories.csv"]);
+    let expected = [
+        "figure.png",
+        "figure.svg",
+        "manifest.json",
+        "recording.bin",
+        "report.html",
+        "summary.json",
+        "trajectories.csv",
+    ];
+    assert_eq!(files, expected);
     let words = String::from_utf8_lossy(&output.stdout).into_owned();
     assert!(words.contains("scene: t = 4 h; 8 axons:") && words.contains("results in out/scene"), "{words}");
     assert!(!errors(&output).contains('\u{1b}'), "no progress bar without a terminal");
@@ -298,7 +307,7 @@ fn an_ablation_tables_every_arm_and_ends_with_one_if_any_failed() {
     let mut files: Vec<_> =
         std::fs::read_dir(&out).unwrap().map(|f| f.unwrap().file_name().into_string().unwrap()).collect();
     files.sort();
-    assert_eq!(files, ["ablation.csv", "ablation.json", "figure.png", "figure.svg", "manifest.json"]);
+    assert_eq!(files, ["ablation.csv", "ablation.json", "figure.png", "figure.svg", "manifest.json", "report.html"]);
 
     let mut broken = scene();
     broken["matrix"] = json!({ "motion": { "top": { "outward": -0.2 }, "bottom": { "outward": -0.2 } } });

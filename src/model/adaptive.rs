@@ -22,6 +22,7 @@ use super::explicit::{difference, finish, run_stages, start_again};
 use super::health::{Counters, Health};
 use super::integrator::bring_tissue_to;
 use super::movers::{ConeQuery, StepStart, each_growing};
+use crate::kept;
 use crate::numerics::runge_kutta::ButcherTableau;
 use bevy_ecs::prelude::{Resource, World};
 
@@ -40,6 +41,8 @@ pub struct AdaptiveSteps {
     /// The largest error of these (µm).
     pub worst: f64,
 }
+
+kept! { struct AdaptiveSteps { tolerance, duration, missed, worst } }
 
 impl AdaptiveSteps {
     /// Steps to a tolerance (µm) in a run that lasts `duration` (h).

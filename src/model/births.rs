@@ -6,6 +6,7 @@ use super::components::{GrowthCone, Journey, Position, Site, SpringState, Status
 use super::movers::{ConeQuery, StepStart};
 use super::shafts::Shafts;
 use super::tissue::{Configuration, Tissue};
+use crate::kept;
 use crate::numerics::simplex_mesh::BorderFacet;
 use bevy_ecs::prelude::{Component, Query, Res, ResMut, Resource, With, World};
 use nalgebra::Vector3;
@@ -34,6 +35,8 @@ pub struct BirthQueue {
     order: Vec<(u64, u32)>,
     next: usize,
 }
+
+kept! { struct BirthQueue { order, next } }
 
 impl BirthQueue {
     /// A queue of births: the instant (ticks) of each cone, in order of the cones.

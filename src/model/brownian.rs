@@ -31,41 +31,41 @@ impl BrownianTree {
         Self { seed, stream, tick }
     }
 
-    /// W(`to`) − W(`from`) of an axon in its two components (√h), instants in ticks, `from ≤ to`.
-    /// The second component serves solid scenes, where a heading has two tangent directions.
-    pub fn increment(&self, axon: u32, from: u64, to: u64) -> [f64; 2] {
-        let mut sum = [0.0; 2];
+    /// W(`to`) − W(`from`) of an axon in its first `N` components (√h), instants in ticks, `from ≤ to`. A heading has one tangent
+    /// direction in the plane and two in space; the first component is the same for both.
+    pub fn increment<const N: usize>(&self, axon: u32, from: u64, to: u64) -> [f64; N] {
+        let mut sum = [0.0; N];
         let mut at = from;
         while at < to {
             let aligned = at.trailing_zeros().min(ROOT_LEVEL);
             let fits = (to - at).ilog2().min(ROOT_LEVEL);
             let level = aligned.min(fits);
-            let part = self.interval(axon, level, at >> level);
-            sum = [sum[0] + part[0], sum[1] + part[1]];
+            let part = self.interval::<N>(axon, level, at >> level);
+            sum = std::array::from_fn(|i| sum[i] + part[i]);
             at += 1 << level;
         }
         sum
     }
 
     /// Increment over the interval `index` of 2^level ticks, from its root down.
-    fn interval(&self, axon: u32, level: u32, index: u64) -> [f64; 2] {
+    fn interval<const N: usize>(&self, axon: u32, level: u32, index: u64) -> [f64; N] {
         let root = index >> (ROOT_LEVEL - level);
         let mut width = self.tick * 2f64.powi(ROOT_LEVEL as i32);
         let scale = width.sqrt();
-        let mut increment = self.normals(axon, ROOT_LEVEL, root).map(|z| scale * z);
+        let mut increment = self.normals::<N>(axon, ROOT_LEVEL, root).map(|z| scale * z);
         for below in (level..ROOT_LEVEL).rev() {
             let child = index >> (below - level);
             let bridge = 0.5 * width.sqrt() * if child & 1 == 0 { 1.0 } else { -1.0 };
-            let z = self.normals(axon, below, child >> 1);
-            increment = [0.5 * increment[0] + bridge * z[0], 0.5 * increment[1] + bridge * z[1]];
+            let z = self.normals::<N>(axon, below, child >> 1);
+            increment = std::array::from_fn(|i| 0.5 * increment[i] + bridge * z[i]);
             width *= 0.5;
         }
         increment
     }
 
-    fn normals(&self, axon: u32, level: u32, index: u64) -> [f64; 2] {
+    fn normals<const N: usize>(&self, axon: u32, level: u32, index: u64) -> [f64; N] {
         let mut rng = KeyedRng::new(self.seed, axon, self.stream, u64::from(level) << 50 | index);
-        [StandardNormal.sample(&mut rng), StandardNormal.sample(&mut rng)]
+        std::array::from_fn(|_| StandardNormal.sample(&mut rng))
     }
 }
 
@@ -81,10 +81,11 @@ mod tests {
     fn parts_of_an_interval_add_up_to_it() {
         let tree = tree();
         let (from, to) = (5 << 12, (5 << 12) + (1 << 26) + (3 << 12));
-        let whole = tree.increment(3, from, to);
+        let whole: [f64; 2] = tree.increment(3, from, to);
         for middle in [from + (1 << 12), 1 << 20, (1 << 25) + (7 << 13)] {
-            let (a, b) = (tree.increment(3, from, middle), tree.increment(3, middle, to));
+            let (a, b): ([f64; 2], [f64; 2]) = (tree.increment(3, from, middle), tree.increment(3, middle, to));
             assert!((0..2).all(|i| (a[i] + b[i] - whole[i]).abs() < 1e-14));
+            assert_eq!(tree.increment::<1>(3, from, middle), [a[0]], "the plane has the first component of space");
         }
     }
 
@@ -94,7 +95,7 @@ mod tests {
         let step = 1u64 << 26;
         let length = tree.tick * step as f64;
         let draws: Vec<f64> = (0..20_000u64)
-            .map(|i| tree.increment((i % 100) as u32, (i / 100) * step, (i / 100 + 1) * step)[0])
+            .map(|i| tree.increment::<1>((i % 100) as u32, (i / 100) * step, (i / 100 + 1) * step)[0])
             .collect();
         let n = draws.len() as f64;
         let variance = draws.iter().map(|x| x * x).sum::<f64>() / n;

@@ -4,6 +4,7 @@
 //! a resumed run meets the same instants, and runs with Δt, Δt/2, Δt/4, … share one grid, which lets them share one
 //! Brownian path (see [`super::brownian`]).
 
+use crate::kept;
 use bevy_ecs::prelude::Resource;
 
 /// Ticks are `mantissa · 2^TICK_EXPONENT` hours.
@@ -17,6 +18,8 @@ pub struct TimeGrid {
     tick: f64,
     step: u64,
 }
+
+kept! { struct TimeGrid { tick, step } }
 
 impl TimeGrid {
     /// The grid of a step Δt (h). Valid for 2^−31 h ≤ Δt < 2^20 h.
@@ -73,6 +76,8 @@ pub struct Clock {
     pub stop: u64,
 }
 
+kept! { struct Clock { grid, now, end, step, stop } }
+
 impl Clock {
     /// A clock at the start of a run that ends at `end` (ticks).
     pub fn new(grid: TimeGrid, end: u64) -> Self {
@@ -119,6 +124,8 @@ impl Kinks {
 /// The instant at which the right-hand side is asked for (h): fields, tissue and receptors are those of this time.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Resource)]
 pub struct StageTime(pub f64);
+
+kept! { wrapper StageTime }
 
 #[cfg(test)]
 mod tests {

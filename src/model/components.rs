@@ -4,6 +4,7 @@
 //! the run to its end: none is added, removed or given other components while it runs, so that the storage stays
 //! contiguous and the order of iteration is the same always.
 
+use crate::kept;
 use crate::numerics::locate::MaterialPoint;
 use bevy_ecs::prelude::Component;
 use nalgebra::Vector3;
@@ -34,6 +35,8 @@ pub struct GrowthCone {
     pub birth_time: f64,
 }
 
+kept! { struct GrowthCone { axon, population, speed, birth, birth_time } }
+
 /// What a growth cone is doing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Component)]
 pub enum Status {
@@ -53,6 +56,8 @@ pub enum Status {
     /// Drawn back to where it began, for good.
     Withdrawn,
 }
+
+kept! { enum Status { Unborn, Growing, Stalled, Arrived, Left, Retracting, Withdrawn } }
 
 impl Status {
     /// The word used in results.
@@ -79,6 +84,8 @@ pub struct Site {
     pub weights: [f64; 3],
 }
 
+kept! { struct Site { cell, weights } }
+
 impl Site {
     /// The point of a planar mesh.
     pub fn planar(self) -> MaterialPoint<2> {
@@ -96,6 +103,8 @@ impl From<MaterialPoint<2>> for Site {
 #[derive(Debug, Clone, Copy, PartialEq, Component)]
 pub struct Position(pub Vector3<f64>);
 
+kept! { wrapper Position }
+
 impl Default for Position {
     fn default() -> Self {
         Self(Vector3::zeros())
@@ -110,6 +119,8 @@ pub struct Velocity {
     /// v_φ, the velocity of the tissue at the cone. Reported only: the site already rides the tissue.
     pub tissue: Vector3<f64>,
 }
+
+kept! { struct Velocity { growth, tissue } }
 
 impl Default for Velocity {
     fn default() -> Self {
@@ -136,6 +147,8 @@ pub struct SpringState {
     /// Angular velocity that turns the heading besides the pull (1/h).
     pub spin: Vector3<f64>,
 }
+
+kept! { struct SpringState { heading, drift, pull, speed_factor, heading_diffusion, spin } }
 
 impl Default for SpringState {
     fn default() -> Self {
@@ -170,6 +183,8 @@ impl SpringState {
 #[derive(Debug, Clone, PartialEq, Default, Component)]
 pub struct ReceptorWeights(pub Box<[f64]>);
 
+kept! { wrapper ReceptorWeights }
+
 /// How far a cone had come when it stopped growing.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Component)]
 pub struct Journey {
@@ -182,3 +197,5 @@ pub struct Journey {
     /// Largest |v_g| over nominal, minus 1, seen so far.
     pub worst_drift: f64,
 }
+
+kept! { struct Journey { first_heading, ended, length, worst_drift } }

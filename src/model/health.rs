@@ -1,5 +1,6 @@
 //! What went wrong while running, and what was done how often.
 
+use crate::kept;
 use bevy_ecs::prelude::Resource;
 use serde::Serialize;
 use std::fmt;
@@ -13,6 +14,8 @@ pub struct Fault {
     pub account: String,
 }
 
+kept! { struct Fault { time, account } }
+
 impl fmt::Display for Fault {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "at t = {} h: {}", self.time, self.account)
@@ -25,6 +28,8 @@ pub struct Health {
     fault: Option<Fault>,
     notes: Vec<String>,
 }
+
+kept! { struct Health { fault, notes } }
 
 impl Health {
     /// Reports a fault at time (h). The first one of a step is kept.
@@ -85,4 +90,11 @@ pub struct Counters {
     pub neighbour_queries: u64,
     /// Segments in the neighbour index.
     pub indexed_segments: u64,
+}
+
+kept! {
+    struct Counters {
+        steps, rejected_steps, cone_steps, stages, cue_solves, cue_factorisations, matrix_solves, newton_iterations,
+        neighbour_queries, indexed_segments,
+    }
 }

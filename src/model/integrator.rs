@@ -15,7 +15,9 @@ use super::growth::{Growth, Method};
 use super::health::{Counters, Health};
 use super::movers::{ConeQuery, Mover, Step, StepStart, each_growing};
 use super::schedule::{MotionSchedule, RightHandSide};
+use super::shafts::Shafts;
 use super::stopwatch::Stopwatch;
+use super::tissue::{Configuration, Tissue};
 use crate::numerics::runge_kutta::{BOGACKI_SHAMPINE, EULER, HEUN, RK4};
 use crate::numerics::turning::{rotate_in_plane, turn};
 use bevy_ecs::prelude::{Local, World};
@@ -54,11 +56,25 @@ pub fn advance(world: &mut World, cones: &mut ConeQuery, mut starts: Local<Vec<S
     report_lost_cones(world, &starts);
 }
 
+/// A configuration in which a cell has no positive volume carries no cone, whoever made it.
+fn report_broken_tissue(world: &mut World) {
+    let configuration = world.resource::<Configuration>();
+    let broken = configuration.moves.then(|| configuration.defect(&world.resource::<Tissue>().mesh)).flatten();
+    if let Some(account) = broken {
+        let time = world.resource::<StageTime>().0;
+        world.resource_mut::<Health>().report(time, account);
+    }
+}
+
 fn report_lost_cones(world: &mut World, starts: &[StepStart]) {
     let lost = starts.iter().enumerate().find_map(|(i, start)| start.fault.as_ref().map(|fault| (i, fault)));
     if let Some((i, fault)) = lost {
         let time = world.resource::<StageTime>().0;
-        world.resource_mut::<Health>().report(time, format!("growth cone {i} was lost: {fault}"));
+        // The tip of the shaft is where the cone was at the end of the last step.
+        let last = world.resource::<Shafts>().tip(i as u32).into();
+        let at = world.resource::<Configuration>().position(&world.resource::<Tissue>().mesh, last);
+        let account = format!("growth cone of axon {i} was lost at ({:.3}, {:.3}) um: {fault}", at.x, at.y);
+        world.resource_mut::<Health>().report(time, account);
     }
 }
 
@@ -67,11 +83,15 @@ pub fn bring_tissue_to(world: &mut World, time: f64) {
     world.resource_mut::<Stopwatch>().lap("integrate");
     world.insert_resource(StageTime(time));
     world.resource_scope::<MotionSchedule, _>(|world, mut motion| motion.0.run(world));
+    report_broken_tissue(world);
     world.resource_mut::<Stopwatch>().lap("matrix motion");
 }
 
-/// Runs the right-hand side at the stage's time.
+/// Runs the right-hand side at the stage's time; not once there is a fault, which fields and neighbours may not survive.
 pub fn evaluate_right_hand_side(world: &mut World) {
+    if world.resource::<Health>().fault().is_some() {
+        return;
+    }
     world.resource_mut::<Counters>().stages += 1;
     world.resource_mut::<Stopwatch>().lap("integrate");
     world.resource_scope::<RightHandSide, _>(|world, mut stage| stage.0.run(world));

@@ -6,12 +6,15 @@
 
 use super::components::GrowthCone;
 use super::health::Health;
+use super::keep::Keep;
+use super::kept::KeptState;
 use super::material_law::{MaterialLaw, Materials};
 use super::plan::Plan;
 use super::random::Stream;
 use super::schedule::{Motion, Phase, Schedules, Slot, Term};
 use super::tissue::Tissue;
 use super::violation::{Violation, Violations};
+use bevy_ecs::component::Mutable;
 use bevy_ecs::prelude::{Component, IntoScheduleConfigs, Resource, World};
 use bevy_ecs::schedule::SystemSet;
 use bevy_ecs::system::ScheduleSystem;
@@ -150,6 +153,8 @@ impl<'a> ModelBuilder<'a> {
         world.init_resource::<Demands>();
         world.init_resource::<Health>();
         world.init_resource::<Plan>();
+        let kept = KeptState::of_core(world);
+        world.insert_resource(kept);
         Self { world, schedules, slot: 0, name: "", seed, finishers: Vec::new(), attachers: Vec::new() }
     }
 
@@ -210,6 +215,32 @@ impl<'a> ModelBuilder<'a> {
             }
         }));
         self
+    }
+
+    /// Keeps a resource of the mechanism's own in checkpoints: needed where it depends on what happened before in the run. Types say
+    /// how by [`kept!`](crate::kept!).
+    pub fn keep<R: Resource<Mutability = Mutable> + Keep>(&mut self) -> &mut Self {
+        let name = self.kept_name::<R>();
+        self.world.resource_mut::<KeptState>().resource::<R>(&name);
+        self
+    }
+
+    /// The same for a component that the mechanism has [attached](Self::attach) to growth cones.
+    pub fn keep_of_cones<C: Component<Mutability = Mutable> + Keep>(&mut self) -> &mut Self {
+        let name = self.kept_name::<C>();
+        self.world.resource_mut::<KeptState>().of_cones::<C>(&name);
+        self
+    }
+
+    /// Runs `rebuild` when a run is resumed, once all that is kept has been read back: for what follows from it.
+    pub fn rebuild(&mut self, rebuild: fn(&mut World)) -> &mut Self {
+        self.world.resource_mut::<KeptState>().rebuilt_by(rebuild);
+        self
+    }
+
+    fn kept_name<T>(&self) -> String {
+        let path = std::any::type_name::<T>();
+        format!("{}/{}", self.name, path.rsplit("::").next().unwrap_or(path))
     }
 
     /// Asks a provider (by its name) for one of its keys, so that it computes it; what nobody asks for is not computed.

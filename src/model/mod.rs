@@ -11,6 +11,8 @@ mod explicit;
 pub mod growth;
 pub mod health;
 pub mod integrator;
+pub mod keep;
+pub mod kept;
 pub mod keys;
 pub mod material_law;
 pub mod mechanism;

@@ -125,8 +125,13 @@ impl Step<'_> {
         match self.noise {
             Some(noise) if diffusion > 0.0 => {
                 let scale = (2.0 * diffusion).sqrt();
-                let increment = noise.0.increment(cone.axon, span.0, span.1);
-                kick(&heading, increment.map(|dw| scale * dw), self.growth.planar)
+                let increments = if self.growth.planar {
+                    let [dw] = noise.0.increment(cone.axon, span.0, span.1);
+                    [dw, 0.0]
+                } else {
+                    noise.0.increment(cone.axon, span.0, span.1)
+                };
+                kick(&heading, increments.map(|dw| scale * dw), self.growth.planar)
             }
             _ => heading,
         }

@@ -1,6 +1,7 @@
 //! Fields that pictures may show: providers say what they have, mechanisms say what it does to cones.
 
 use super::components::Site;
+use crate::kept;
 use bevy_ecs::prelude::{Resource, World};
 use nalgebra::Vector3;
 use std::collections::BTreeMap;
@@ -13,6 +14,8 @@ pub enum Effect {
     /// Cones turn down its gradient.
     Repel,
 }
+
+kept! { enum Effect { Attract, Repel } }
 
 /// Nodal values of a field in the world's present configuration.
 pub type FieldReader = fn(&World, usize) -> Vec<f64>;

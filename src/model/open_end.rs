@@ -3,6 +3,8 @@
 //! Each point passed at a distance r from the anchor, the last stored vertex, allows chords within tolerance/r of its own
 //! direction. What all points allow is a sector, kept as tangents of angles from a first direction.
 
+use crate::kept;
+
 /// The sector of allowed directions (all in the reference configuration, µm).
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(super) struct OpenEnd {
@@ -14,6 +16,8 @@ pub(super) struct OpenEnd {
     high: f64,
     far: f64,
 }
+
+kept! { struct OpenEnd { anchor, tip, axis, low, high, far } }
 
 impl OpenEnd {
     /// An end of no length.

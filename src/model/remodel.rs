@@ -6,6 +6,7 @@ use super::clock::Clock;
 use super::components::{GrowthCone, Journey, Position, Site, SpringState, Status, Velocity};
 use super::shafts::{ShaftPoint, Shafts, VertexId};
 use super::tissue::{Configuration, Tissue};
+use crate::kept;
 use crate::numerics::walk::{BorderRule, nowhere, walk};
 use bevy_ecs::prelude::{Query, Res, ResMut, Resource, With};
 use bevy_ecs::system::SystemParam;
@@ -27,6 +28,9 @@ struct Fork {
     parent: u32,
     time: f32,
 }
+
+kept! { struct SpareCones { axons, each, forks } }
+kept! { struct Fork { parent, time } }
 
 impl SpareCones {
     /// `each` spare cones for each of `axons` axons.
@@ -76,6 +80,8 @@ impl SpareCones {
 /// same. Cleared before each step; mechanisms that go on set it.
 #[derive(Debug, Clone, Copy, Default, Resource)]
 pub struct Unrest(pub bool);
+
+kept! { wrapper Unrest }
 
 /// Where a branch begins.
 #[derive(Debug, Clone, Copy, PartialEq)]

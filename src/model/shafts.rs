@@ -7,6 +7,7 @@
 
 use super::components::Site;
 use super::open_end::OpenEnd;
+use crate::kept;
 use crate::numerics::locate::MaterialPoint;
 use bevy_ecs::prelude::Resource;
 
@@ -35,6 +36,8 @@ struct Chain {
     end: OpenEnd,
 }
 
+kept! { struct Chain { first, last, tip, tip_time, end } }
+
 /// The bit of a vertex among those of its block.
 fn bit(vertex: VertexId) -> u16 {
     1 << (vertex as usize % BLOCK)
@@ -62,6 +65,12 @@ pub struct Shafts {
     struck: Vec<Struck>,
 }
 
+kept! {
+    struct Shafts {
+        tolerance, longest, cells, times, weights, used, next, before, owner, chains, watched, laid, fresh, struck,
+    }
+}
+
 /// A vertex that is no longer there, and the material point it was.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Struck {
@@ -71,6 +80,8 @@ pub struct Struck {
     pub point: MaterialPoint<2>,
 }
 
+kept! { struct Struck { vertex, point } }
+
 /// A point of a shaft that is laid anew: its site, and when the cone passed it (h).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ShaftPoint {
@@ -79,6 +90,8 @@ pub struct ShaftPoint {
     /// Time (h).
     pub time: f32,
 }
+
+kept! { struct ShaftPoint { site, time } }
 
 impl Shafts {
     /// `count` shafts without a point. `tolerance` and `longest` in µm.
@@ -226,6 +239,13 @@ impl Shafts {
         let was = *fresh & bit(vertex) != 0;
         *fresh &= !bit(vertex);
         was
+    }
+
+    /// Vertices that have been taken as laid and still stand, ascending: what an index holds that is up to date with what was taken.
+    pub fn taken(&self) -> impl Iterator<Item = VertexId> + '_ {
+        let blocks = 0..self.block_count() as u32;
+        let stored = blocks.flat_map(|block| self.block_vertices(block));
+        stored.filter(|&vertex| self.fresh[vertex as usize / BLOCK] & bit(vertex) == 0)
     }
 
     /// Vertices struck out since the last call that had been taken as laid before: what a neighbour index has to

@@ -8,6 +8,7 @@ use crate::numerics::simplex_mesh::{BorderFacet, SimplexMesh};
 use bevy_ecs::prelude::Resource;
 use nalgebra::{Matrix2, Vector2, Vector3};
 use rayon::prelude::*;
+use std::cmp::Ordering;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -111,6 +112,26 @@ impl Configuration {
     /// Deformation gradient F of a cell.
     pub fn deformation_gradient(&self, mesh: &SimplexMesh<2>, cell: u32) -> Matrix2<f64> {
         gradient_of(mesh, &self.coordinates, cell)
+    }
+
+    /// What is wrong with the configuration, if anything: a vertex that is nowhere, or a cell that is flat or turned over.
+    pub fn defect(&self, mesh: &SimplexMesh<2>) -> Option<String> {
+        let area = |cell: u32| {
+            let [a, b, c] = [0, 1, 2].map(|i| self.coordinates[mesh.cell(cell as usize)[i] as usize]);
+            (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+        };
+        let cells = (0..mesh.cell_count() as u32).into_par_iter().with_min_len(4096);
+        let cell = cells.find_first(|cell| area(*cell).partial_cmp(&0.0) != Some(Ordering::Greater))?;
+        let nowhere = |x: &[f64; 2]| !(x[0].is_finite() && x[1].is_finite());
+        if let Some(vertex) = self.coordinates.iter().position(nowhere) {
+            let [x, y] = self.coordinates[vertex];
+            return Some(format!("the tissue's mesh is no longer valid: vertex {vertex} is at ({x:.3}, {y:.3}) um"));
+        }
+        let middle =
+            |k: usize| mesh.cell(cell as usize).iter().map(|v| self.coordinates[*v as usize][k]).sum::<f64>() / 3.0;
+        let det = self.deformation_gradient(mesh, cell).determinant();
+        let (x, y) = (middle(0), middle(1));
+        Some(format!("the tissue is turned over: cell {cell} at ({x:.3}, {y:.3}) um, det F = {det:.4}"))
     }
 
     /// Spin (rad/h, about z) of the tissue in a cell: the rate at which the rotation of F = R U turns, which is the

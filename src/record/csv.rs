@@ -2,6 +2,7 @@
 //! the same bits.
 
 use super::output::{WriteError, write_atomically};
+use crate::kept;
 use rayon::prelude::*;
 use std::borrow::Cow;
 use std::fmt::Write;
@@ -74,6 +75,8 @@ pub struct CsvTable {
     columns: usize,
     rows: usize,
 }
+
+kept! { struct CsvTable { text, columns, rows } }
 
 impl CsvTable {
     /// Starts a table from its columns, each a name and a unit (`("x", "um")` heads the column `x [um]`; an empty unit

@@ -22,11 +22,112 @@ pub struct WriteError {
 /// The path and the system's reason; the temporary file is removed.
 pub fn write_atomically(path: &Path, contents: &[u8]) -> Result<(), WriteError> {
     let temporary = temporary_beside(path);
-    write_and_rename(&temporary, path, contents).map_err(|source| {
+    write_whole(&temporary, contents).and_then(|()| put(&temporary, path)).map_err(|source| {
         // The first failure is the one to report; a leftover that cannot be removed adds nothing.
         let _ = fs::remove_file(&temporary);
         WriteError { path: path.to_owned(), source }
     })
+}
+
+/// As [`write_atomically`], but the file that was there goes to `previous` first. At any instant one of the two is whole.
+///
+/// # Errors
+/// As [`write_atomically`]; what was there stays.
+pub fn write_and_keep_previous(path: &Path, previous: &Path, contents: &[u8]) -> Result<(), WriteError> {
+    let temporary = temporary_beside(path);
+    let make_room = || if path.exists() { fs::rename(path, previous) } else { Ok(()) };
+    let written = write_whole(&temporary, contents).and_then(|()| make_room()).and_then(|()| put(&temporary, path));
+    written.map_err(|source| {
+        let _ = fs::remove_file(&temporary);
+        WriteError { path: path.to_owned(), source }
+    })
+}
+
+/// As [`write_atomically`], but not flushed to disk: for many small files of which none is worth the wait.
+///
+/// # Errors
+/// As [`write_atomically`].
+pub fn write_unsynced(path: &Path, contents: &[u8]) -> Result<(), WriteError> {
+    let temporary = temporary_beside(path);
+    let written = fs::write(&temporary, contents).and_then(|()| fs::rename(&temporary, path));
+    written.map_err(|source| WriteError { path: path.to_owned(), source })
+}
+
+/// A file that grows under a temporary name beside its own, and takes that only when it is complete.
+#[derive(Debug)]
+pub struct Partial {
+    path: PathBuf,
+    temporary: PathBuf,
+    file: Option<File>,
+}
+
+impl Partial {
+    /// Begins a file, making missing folders.
+    ///
+    /// # Errors
+    /// The path and the system's reason.
+    pub fn create(path: &Path) -> Result<Self, WriteError> {
+        let temporary = temporary_beside(path);
+        let file = make_parent(path).and_then(|()| File::create(&temporary));
+        let file = file.map_err(|source| WriteError { path: path.to_owned(), source })?;
+        Ok(Self { path: path.to_owned(), temporary, file: Some(file) })
+    }
+
+    /// Appends bytes.
+    ///
+    /// # Errors
+    /// The path and the system's reason.
+    pub fn write(&mut self, bytes: &[u8]) -> Result<(), WriteError> {
+        let written = self.file.as_mut().map_or(Ok(()), |file| file.write_all(bytes));
+        written.map_err(|source| WriteError { path: self.path.clone(), source })
+    }
+
+    /// What has been appended so far.
+    ///
+    /// # Errors
+    /// The path and the system's reason.
+    pub fn contents(&self) -> Result<Vec<u8>, WriteError> {
+        fs::read(&self.temporary).map_err(|source| WriteError { path: self.path.clone(), source })
+    }
+
+    /// Gives the file its name.
+    ///
+    /// # Errors
+    /// The path and the system's reason.
+    pub fn commit(mut self) -> Result<(), WriteError> {
+        let synced = self.file.as_ref().map_or(Ok(()), File::sync_all);
+        let named = synced.and_then(|()| fs::rename(&self.temporary, &self.path));
+        named.map_err(|source| WriteError { path: self.path.clone(), source })?;
+        self.file = None;
+        Ok(())
+    }
+}
+
+impl Drop for Partial {
+    fn drop(&mut self) {
+        if self.file.take().is_some() {
+            // What was abandoned is of no use; if it cannot be removed, nothing more can be done.
+            let _ = fs::remove_file(&self.temporary);
+        }
+    }
+}
+
+/// Makes a folder for files of one ending, and removes those that an earlier run left there.
+///
+/// # Errors
+/// The path and the system's reason.
+pub fn clear_folder(folder: &Path, ending: &str) -> Result<(), WriteError> {
+    let clear = || {
+        fs::create_dir_all(folder)?;
+        for entry in fs::read_dir(folder)? {
+            let path = entry?.path();
+            if path.extension().is_some_and(|found| found == ending) {
+                fs::remove_file(path)?;
+            }
+        }
+        Ok(())
+    };
+    clear().map_err(|source| WriteError { path: folder.to_owned(), source })
 }
 
 /// Makes a folder for results and tries to write into it, so that a long run does not end in one that cannot be written.
@@ -51,15 +152,33 @@ fn temporary_beside(path: &Path) -> PathBuf {
     path.with_file_name(name)
 }
 
-/// The two steps of an atomic write.
-fn write_and_rename(temporary: &Path, path: &Path, contents: &[u8]) -> io::Result<()> {
-    if let Some(folder) = path.parent().filter(|folder| !folder.as_os_str().is_empty()) {
-        fs::create_dir_all(folder)?;
+fn make_parent(path: &Path) -> io::Result<()> {
+    match path.parent().filter(|folder| !folder.as_os_str().is_empty()) {
+        Some(folder) => fs::create_dir_all(folder),
+        None => Ok(()),
     }
+}
+
+/// The first step of an atomic write: all of a file, on disk.
+fn write_whole(temporary: &Path, contents: &[u8]) -> io::Result<()> {
+    make_parent(temporary)?;
     let mut file = File::create(temporary)?;
     file.write_all(contents)?;
-    file.sync_all()?;
-    fs::rename(temporary, path)
+    file.sync_all()
+}
+
+/// The second step: its name, on disk too.
+fn put(temporary: &Path, path: &Path) -> io::Result<()> {
+    fs::rename(temporary, path)?;
+    if let Some(folder) = folder_of(path).filter(|_| cfg!(unix)) {
+        // The file is there; a system that cannot flush folders keeps it all the same.
+        let _ = File::open(folder).and_then(|folder| folder.sync_all());
+    }
+    Ok(())
+}
+
+fn folder_of(path: &Path) -> Option<&Path> {
+    path.parent().map(|folder| if folder.as_os_str().is_empty() { Path::new(".") } else { folder })
 }
 
 #[cfg(test)]

@@ -44,6 +44,14 @@ pub fn scale_for_dpi(dpi: f32) -> f32 {
 /// # Errors
 /// An SVG that cannot be read, a picture too large, an image in it that is no PNG.
 pub fn to_png(svg: &str, scale: f32) -> Result<Vec<u8>, PngError> {
+    encode(render(svg, scale)?)
+}
+
+/// As [`to_png`], the pixels themselves.
+///
+/// # Errors
+/// As [`to_png`].
+pub fn render(svg: &str, scale: f32) -> Result<Pixmap, PngError> {
     let to_pixels = Transform::from_scale(scale, scale);
     let images = || {
         let tree = usvg::Tree::from_str(svg, &usvg::Options::default())?;
@@ -54,7 +62,7 @@ pub fn to_png(svg: &str, scale: f32) -> Result<Vec<u8>, PngError> {
     let (canvas, drawings) = rayon::join(images, || usvg::Tree::from_str(svg, &options_without_images()));
     let mut canvas = canvas?;
     resvg::render(&drawings?, to_pixels, &mut canvas.as_mut());
-    encode(canvas)
+    Ok(canvas)
 }
 
 /// A picture as PNG, compressed lightly: a tenth of the time of a thorough compression.

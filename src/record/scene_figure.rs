@@ -115,6 +115,8 @@ pub struct SceneFigure {
     pub panels: Vec<Panel>,
     /// Panels a row; none chooses (up to three panels in one row, two rows of two, then rows of three).
     pub columns: Option<usize>,
+    /// Width of the figure, px; none chooses by the number of columns.
+    pub width: Option<f64>,
     /// Whether the outline of the first panel is repeated in panels whose tissue has another shape.
     pub compare_outlines: bool,
 }
@@ -122,7 +124,14 @@ pub struct SceneFigure {
 impl SceneFigure {
     /// A figure with the usual choices.
     pub fn new(title: impl Into<String>, subtitle: impl Into<String>, panels: Vec<Panel>) -> Self {
-        Self { title: title.into(), subtitle: subtitle.into(), panels, columns: None, compare_outlines: true }
+        Self {
+            title: title.into(),
+            subtitle: subtitle.into(),
+            panels,
+            columns: None,
+            width: None,
+            compare_outlines: true,
+        }
     }
 }
 
@@ -172,19 +181,25 @@ pub enum FigureError {
         /// Vertices of the panel.
         expected: usize,
     },
+    /// The width asked for leaves too little for a panel.
+    #[error("{columns} panels a row need a width of {:.0} mm at least", least * 25.4 / 96.0)]
+    TooNarrow {
+        /// Panels a row.
+        columns: usize,
+        /// Least width, px.
+        least: f64,
+    },
     /// A raster image could not be made.
     #[error("an image of the figure could not be made")]
     Image,
 }
 
-/// Draws a figure: 180 mm wide from three columns on, no text below 7 pt, fonts embedded.
+/// Draws a figure: 180 mm wide from three columns on unless it has a width, no text below 7 pt, fonts embedded.
 ///
 /// # Errors
 /// A figure without panels or extent, positions or concentrations that are not finite or do not match the mesh.
 pub fn draw(figure: &SceneFigure) -> Result<Svg, FigureError> {
-    for (index, panel) in figure.panels.iter().enumerate() {
-        check_panel(index, panel)?;
-    }
+    check(figure)?;
     let layout = Layout::of(figure)?;
     let painter = PanelPainter::of(figure, &layout.cell(0).view);
     let legend = Legend::of(figure, &painter);
@@ -217,7 +232,12 @@ pub fn bytes_to_draw(panels: usize, extent: [f64; 2], scale: f64) -> Result<f64,
     Ok(page + layout.drawing_area() * FIELD_DENSITY.powi(2) * raster::BYTES_A_PIXEL as f64)
 }
 
-fn check_panel(index: usize, panel: &Panel) -> Result<(), FigureError> {
+/// Refuses what cannot be drawn.
+pub(super) fn check(figure: &SceneFigure) -> Result<(), FigureError> {
+    figure.panels.iter().enumerate().try_for_each(|(index, panel)| check_panel(index, panel))
+}
+
+pub(super) fn check_panel(index: usize, panel: &Panel) -> Result<(), FigureError> {
     let finite = |points: &[[f64; 2]]| points.iter().flatten().all(|value| value.is_finite());
     let checks = [
         ("vertices", finite(&panel.vertices)),

@@ -7,6 +7,8 @@ use super::theme::{self, Font};
 
 /// Room for a panel's letter.
 const LETTER_WIDTH: f64 = 17.0;
+/// Width of a column at least.
+const LEAST_WIDTH: f64 = 60.0;
 /// Room for the scale bar under a panel.
 const SCALE_BAR_ROOM: f64 = 18.0;
 
@@ -28,6 +30,8 @@ pub(super) struct Layout {
     feet: Vec<Vec<String>>,
     row_height: f64,
     head_height: f64,
+    /// Whether panels have letters.
+    letters: bool,
 }
 
 /// A panel's place.
@@ -42,11 +46,16 @@ impl Layout {
         let count = figure.panels.len();
         let (low, high) = extent(&figure.panels)?;
         let columns = figure.columns.unwrap_or(default_columns(count)).clamp(1, count.max(1));
-        let widest = [0.0, 360.0, 310.0].get(columns).copied();
-        let shared = (theme::FULL_WIDTH - 2.0 * theme::MARGIN - (columns - 1) as f64 * theme::GAP) / columns as f64;
+        let widest = [0.0, 360.0, 310.0].get(columns).copied().filter(|_| figure.width.is_none());
+        let shared =
+            (figure.width.unwrap_or(theme::FULL_WIDTH) - 2.0 * theme::MARGIN - (columns - 1) as f64 * theme::GAP)
+                / columns as f64;
         let cell_width = widest.unwrap_or(shared);
+        if cell_width < LEAST_WIDTH {
+            return Err(FigureError::TooNarrow { columns, least: total_width(columns, LEAST_WIDTH) });
+        }
         let scale = (cell_width / (high[0] - low[0])).min(theme::PANEL_HEIGHT / (high[1] - low[1]));
-        let width = 2.0 * theme::MARGIN + columns as f64 * cell_width + (columns - 1) as f64 * theme::GAP;
+        let width = total_width(columns, cell_width);
         let inner = width - 2.0 * theme::MARGIN;
         let head = |panel: &Panel| Font::regular(theme::LABEL).wrap(&panel.label, cell_width - LETTER_WIDTH);
         let foot = |panel: &Panel| {
@@ -67,8 +76,16 @@ impl Layout {
             feet: figure.panels.iter().map(foot).collect(),
             row_height: 0.0,
             head_height: 0.0,
+            letters: count > 1,
         };
         layout.stack(count);
+        Ok(layout)
+    }
+
+    /// The place of the panels of a moving picture: all in one, with room for the largest of their heads and feet.
+    pub(super) fn of_frames(figure: &SceneFigure) -> Result<Self, FigureError> {
+        let mut layout = Self { letters: false, ..Self::of(figure)? };
+        layout.stack(1);
         Ok(layout)
     }
 
@@ -132,10 +149,9 @@ impl Layout {
     pub(super) fn draw_head(&self, svg: &mut Svg, cell: &CellPlace, index: usize) {
         let [x, y] = cell.corner;
         let letter = letter_of(index);
-        let several = self.heads.len() > 1;
-        let indent = if several { LETTER_WIDTH } else { 0.0 };
+        let indent = if self.letters { LETTER_WIDTH } else { 0.0 };
         let font = Font::bold(theme::LETTER);
-        if several {
+        if self.letters {
             let at = [x, y + theme::LABEL];
             svg.label(&Label { at, anchor: Anchor::Start, font, colour: theme::TEXT, halo: false, text: &letter });
         }
@@ -169,6 +185,11 @@ impl Layout {
         let font = Font::regular(theme::SMALL);
         svg.label(&Label { at: end, anchor: Anchor::Start, font, colour: theme::TEXT, halo: false, text: &text });
     }
+}
+
+/// Width of a figure, from that of a column.
+fn total_width(columns: usize, cell_width: f64) -> f64 {
+    2.0 * theme::MARGIN + columns as f64 * cell_width + (columns - 1) as f64 * theme::GAP
 }
 
 /// Panels a row if nobody chose.

@@ -1,5 +1,6 @@
 //! What a run looks like at one instant: plain data for pictures and measures.
 
+use crate::kept;
 use crate::model::clock::Clock;
 use crate::model::components::{GrowthCone, Journey, Site, SpringState, Status};
 use crate::model::observables::{Effect, Observables};
@@ -21,6 +22,8 @@ pub struct FieldView {
     pub concentration: Vec<f64>,
 }
 
+kept! { struct FieldView { name, effect, concentration } }
+
 /// A growth cone seen from outside.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TipView {
@@ -35,6 +38,8 @@ pub struct TipView {
     /// Whether it is the tip of a branch.
     pub is_branch: bool,
 }
+
+kept! { struct TipView { axon, position, heading, status, is_branch } }
 
 /// The scene at one instant.
 #[derive(Debug, Clone, PartialEq)]
@@ -57,6 +62,8 @@ pub struct Snapshot {
     pub targets: Vec<(String, Vec<[f64; 2]>)>,
 }
 
+kept! { struct Snapshot { time, vertices, cells, borders, fields, shafts, tips, targets } }
+
 impl Snapshot {
     /// Looks at a world whose tissue has been brought to the present.
     pub fn of(world: &World) -> Self {
@@ -72,6 +79,15 @@ impl Snapshot {
             tips: tips(world),
             targets: targets(tissue, configuration),
         }
+    }
+}
+
+impl Snapshot {
+    /// Whether every position is a number: one that a fault has spoilt cannot be drawn.
+    pub fn is_finite(&self) -> bool {
+        let tips = self.tips.iter().flat_map(|tip| [&tip.position, &tip.heading]);
+        let mut positions = self.vertices.iter().chain(self.shafts.iter().flatten()).chain(tips);
+        positions.all(|x| x[0].is_finite() && x[1].is_finite())
     }
 }
 
@@ -156,16 +172,21 @@ fn fields(world: &World) -> Vec<FieldView> {
 
 /// The named edges as they are now; an edge in several pieces gives several polylines.
 fn borders(tissue: &Tissue, configuration: &Configuration) -> Vec<(String, Vec<[f64; 2]>)> {
+    border_vertices(tissue).into_iter().map(|(name, line)| (name, places(&line, configuration))).collect()
+}
+
+/// The vertices along the named edges; an edge in several pieces gives several lists.
+pub fn border_vertices(tissue: &Tissue) -> Vec<(String, Vec<u32>)> {
     let mut lines = Vec::new();
     for (name, facets) in tissue.domain.edge_names.iter().zip(&tissue.edges) {
         let mut last = None;
         for facet in facets {
             let ends: Vec<u32> = tissue.mesh.facet_vertices(*facet).collect();
             if last != Some(ends[0]) {
-                lines.push((name.clone(), vec![configuration.coordinates[ends[0] as usize]]));
+                lines.push((name.clone(), vec![ends[0]]));
             }
             if let Some((_, line)) = lines.last_mut() {
-                line.push(configuration.coordinates[ends[1] as usize]);
+                line.push(ends[1]);
             }
             last = Some(ends[1]);
         }
@@ -175,15 +196,19 @@ fn borders(tissue: &Tissue, configuration: &Configuration) -> Vec<(String, Vec<[
 
 /// The border of each target as it is now.
 fn targets(tissue: &Tissue, configuration: &Configuration) -> Vec<(String, Vec<[f64; 2]>)> {
+    target_vertices(tissue).into_iter().map(|(name, ring)| (name, places(&ring, configuration))).collect()
+}
+
+/// The vertices along the border of each target, the first one repeated.
+pub fn target_vertices(tissue: &Tissue) -> Vec<(String, Vec<u32>)> {
     let named = tissue.regions.iter().filter_map(|(name, cells)| Some((name.strip_prefix("targets/")?, cells)));
     named
-        .flat_map(|(name, cells)| {
-            region_rings(tissue, cells).into_iter().map(move |ring| {
-                let points = ring.iter().map(|&vertex| configuration.coordinates[vertex as usize]);
-                (name.to_owned(), points.collect())
-            })
-        })
+        .flat_map(|(name, cells)| region_rings(tissue, cells).into_iter().map(move |ring| (name.to_owned(), ring)))
         .collect()
+}
+
+fn places(vertices: &[u32], configuration: &Configuration) -> Vec<[f64; 2]> {
+    vertices.iter().map(|&vertex| configuration.coordinates[vertex as usize]).collect()
 }
 
 /// The closed borders of a set of cells (ascending), as vertices with the first one repeated.

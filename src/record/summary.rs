@@ -153,7 +153,7 @@ impl Summary {
 }
 
 /// The morphology; without targets there is no hit fraction.
-fn morphology(world: &World, options: &MeasureOptions) -> Morphology {
+pub fn morphology(world: &World, options: &MeasureOptions) -> Morphology {
     let mut found = measure(&axon_records(world), options);
     if world.resource::<Targets>().cells.is_empty() {
         for hits in [&mut found.hits, &mut found.hits_early, &mut found.hits_late] {
@@ -163,7 +163,8 @@ fn morphology(world: &World, options: &MeasureOptions) -> Morphology {
     found
 }
 
-fn counts(world: &World) -> Counts {
+/// How many axons are in which state.
+pub fn counts(world: &World) -> Counts {
     let axons = world.resource::<Populations>().0.iter().map(|population| population.count).sum();
     let mut counts = Counts { axons, ..Counts::default() };
     let arrivals = arrivals(world);

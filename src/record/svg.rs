@@ -2,6 +2,8 @@
 
 use super::lettering::outline;
 use super::theme::{self, Font};
+use base64::Engine;
+use base64::prelude::BASE64_STANDARD;
 use std::fmt::Write;
 
 /// An SVG document under construction, in CSS pixels, y downward.
@@ -59,6 +61,11 @@ impl Svg {
         Self { width, height, body: String::new(), lines: Vec::new() }
     }
 
+    /// Width and height in px.
+    pub fn size(&self) -> [f64; 2] {
+        [self.width, self.height]
+    }
+
     /// A drawing to be appended to this one.
     pub fn part(&self) -> Self {
         Self::new(self.width, self.height)
@@ -110,7 +117,7 @@ impl Svg {
 
     /// Appends a PNG image that fills the rectangle at `corner` (upper left) of `size`, in px.
     pub fn image(&mut self, corner: [f64; 2], size: [f64; 2], png: &[u8]) {
-        let href = format!("data:image/png;base64,{}", base64(png));
+        let href = format!("data:image/png;base64,{}", BASE64_STANDARD.encode(png));
         let [x, y] = corner.map(number);
         let [width, height] = size.map(number);
         self.element(
@@ -138,7 +145,7 @@ impl Svg {
         let face = |weight: &str, data: &[u8]| {
             format!(
                 "@font-face{{font-family:'DejaVu Sans';font-weight:{weight};src:url(data:font/woff2;base64,{}) format('woff2')}}\n",
-                base64(data)
+                BASE64_STANDARD.encode(data)
             )
         };
         let faces = [face("normal", theme::WEB_FONT_REGULAR), face("bold", theme::WEB_FONT_BOLD)].concat();
@@ -303,31 +310,9 @@ fn escape(target: &mut String, text: &str) {
     }
 }
 
-/// Base64 with padding (RFC 4648).
-fn base64(bytes: &[u8]) -> String {
-    const ALPHABET: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-    let mut text = String::with_capacity(bytes.len().div_ceil(3) * 4);
-    for chunk in bytes.chunks(3) {
-        let group = chunk.iter().enumerate().fold(0_u32, |group, (i, &byte)| group | u32::from(byte) << (16 - 8 * i));
-        for place in 0..4 {
-            let index = (group >> (18 - 6 * place)) & 63;
-            text.push(if place <= chunk.len() { ALPHABET[index as usize] as char } else { '=' });
-        }
-    }
-    text
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn base64_agrees_with_the_test_vectors_of_rfc_4648() {
-        let expected = ["", "Zg==", "Zm8=", "Zm9v", "Zm9vYg==", "Zm9vYmE=", "Zm9vYmFy"];
-        for (length, expected) in expected.iter().enumerate() {
-            assert_eq!(base64(&b"foobar"[..length]), *expected);
-        }
-    }
 
     #[test]
     fn numbers_are_short_and_never_nan() {

@@ -11,6 +11,7 @@ use thiserror::Error;
 use super::checks::check_region;
 use super::expressions;
 use super::merge::{idle_removals, merge, strip_nulls};
+use super::outline_file::take_in;
 use super::overrides;
 use super::read::read_file;
 use super::scene::Scene;
@@ -108,6 +109,7 @@ fn check(chain: &[Document], request: &Request, blocks: &[BlockSchema]) -> Resul
     draft.apply_overrides(request, blocks);
     expressions::evaluate(&mut draft.document, &mut draft.problems);
     draft.walk(blocks);
+    draft.take_in_outline(chain, request);
     draft.name_origins(chain);
     let stem = request.path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
     let (scene, blocks) = draft.finish(&stem, blocks);
@@ -231,6 +233,17 @@ impl Draft {
         if let Some(object) = self.document.as_object_mut() {
             object.shift_remove("$schema");
             object.shift_remove("base");
+        }
+    }
+
+    /// Puts the outline of a file in its place; the file lies beside the scenario that names it.
+    fn take_in_outline(&mut self, chain: &[Document], request: &Request) {
+        let sound = !self.problems.iter().any(|problem| problem.pointer.starts_with("/tissue"));
+        let names = |file: &&Document| file.value.pointer("/tissue/outline").is_some();
+        let by_set = self.overridden.iter().any(|pointer| pointer.starts_with("/tissue/outline"));
+        let source = chain.iter().find(names).filter(|_| !by_set).map_or(&request.path, |file| &file.path);
+        if sound && let Err(problem) = take_in(&mut self.document, source.parent().unwrap_or(Path::new(""))) {
+            self.problems.push(problem);
         }
     }
 

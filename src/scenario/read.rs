@@ -3,6 +3,7 @@
 use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
+use std::string::FromUtf8Error;
 
 use serde::de::{DeserializeSeed, Deserializer, MapAccess, SeqAccess, Visitor};
 use serde_json::{Map, Number, Value};
@@ -66,6 +67,15 @@ pub enum ReadError {
 /// # Errors
 /// A [`ReadError`]; those that do not name the file are about its content.
 pub fn read_file(path: &Path) -> Result<Value, ReadError> {
+    let text = read_text(path)?;
+    parse(text.strip_prefix('\u{feff}').unwrap_or(&text))
+}
+
+/// Reads a text of at most [`LARGEST_FILE`].
+///
+/// # Errors
+/// A [`ReadError`] that names the file.
+pub fn read_text(path: &Path) -> Result<String, ReadError> {
     let owned = || path.to_path_buf();
     let unreadable = |source: std::io::Error| match source.kind() {
         std::io::ErrorKind::NotFound => ReadError::Missing { path: owned() },
@@ -81,9 +91,8 @@ pub fn read_file(path: &Path) -> Result<Value, ReadError> {
     if bytes.len() as u64 > LARGEST_FILE {
         return Err(ReadError::TooLarge { path: owned() });
     }
-    let text =
-        std::str::from_utf8(&bytes).map_err(|error| ReadError::NotText { path: owned(), at: error.valid_up_to() })?;
-    parse(text.strip_prefix('\u{feff}').unwrap_or(text))
+    let not_text = |error: FromUtf8Error| ReadError::NotText { path: owned(), at: error.utf8_error().valid_up_to() };
+    String::from_utf8(bytes).map_err(not_text)
 }
 
 /// Reads a JSON text.

@@ -10,6 +10,7 @@ use crate::keys;
 use crate::model::quantity::{Factor, Length, Rate, Time};
 use crate::model::shape::Shape;
 
+pub use super::files::{Every, Swc, Tables, Vtu};
 pub use super::population::{Births, Direction, EdgeOrigin, EdgePart, Heading, Origin, Population};
 pub use super::tissue::{Outline, Ring, Tissue};
 
@@ -91,12 +92,34 @@ keys! {
         /// When figures are drawn, as shares of the duration.
         #[schemars(inner(range(min = 0.0, max = 1.0)))]
         pub figure_times: Vec<Factor> = vec![Factor(0.0), Factor(0.5), Factor(1.0)],
+        /// How many frames a recording of the run has, at equal times from start to end; those of figures come besides. 0 for no recording.
+        /// By default 73, or none with more than 20 000 axons.
+        #[schemars(extend("minimum" = 0, "maximum" = 10_000))]
+        pub frames: Option<u32> = None,
         /// Shafts nearer than this belong to one fascicle.
         #[schemars(extend("exclusiveMinimum" = 0.0))]
         pub linkage_distance: Length = Length(10.0),
         /// The heights at which spread and fascicles are measured, as shares of the height of the tissue.
         #[schemars(inner(range(min = 0.0, max = 1.0)))]
         pub heights: Vec<Factor> = vec![Factor(0.25), Factor(0.5), Factor(0.75)],
+        /// The form of tables.
+        pub tables: Tables = Tables::Csv,
+        /// A table `measures`: a row a time, with the numbers of the summary.
+        pub measures: Option<Every> = None,
+        /// A table `axons`: a row an axon or branch, and time.
+        pub axons: Option<Every> = None,
+        /// Axons as SWC, for NeuroM, MorphIO and navis.
+        pub swc: Option<Swc> = None,
+        /// Tissue, fields and shafts as VTU, for ParaView, meshio and pyvista.
+        pub vtu: Option<Vtu> = None,
+    }
+}
+
+impl Output {
+    /// Frames of a recording, or the default for a number of axons.
+    pub fn frames(&self, axons: u64) -> u32 {
+        const MOST_AXONS: u64 = 20_000;
+        self.frames.unwrap_or(if axons > MOST_AXONS { 0 } else { 73 })
     }
 }
 

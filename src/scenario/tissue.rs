@@ -3,6 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::outline_file::FiledOutline;
 use crate::keys;
 use crate::model::quantity::{Angle, Factor, Length};
 use crate::model::shape::{Point, coordinates, signed_area};
@@ -11,6 +12,7 @@ keys! {
     /// The tissue at rest and its mesh.
     pub struct Tissue {
         /// The border of the tissue at rest.
+        #[schemars(with = "WrittenOutline")]
         pub outline: Outline = Outline::default(),
         /// The longest edge wanted in the mesh; a quarter of the decay length of a cue is an upper bound.
         #[schemars(extend("exclusiveMinimum" = 0.0, "x-typical" = [2.0, 60.0]))]
@@ -43,6 +45,17 @@ keys! {
         /// The name of each side, from its point to the next; sides may share one. By default all are called `outer`, or `hole`.
         pub edges: Vec<String> = Vec::new(),
     }
+}
+
+/// The border of the tissue at rest, as it may be written: a file gives way to its polygon on loading.
+#[derive(JsonSchema)]
+#[serde(untagged)]
+#[allow(dead_code)] // its schema is what is used
+enum WrittenOutline {
+    /// In the scene.
+    Here(Outline),
+    /// In a file.
+    Filed(FiledOutline),
 }
 
 /// The border of the tissue at rest.

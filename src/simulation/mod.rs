@@ -9,10 +9,12 @@ mod populate;
 pub use assemble::AssemblyError;
 
 use crate::model::adaptive::idle_until;
-use crate::model::clock::Clock;
+use crate::model::clock::{Clock, StageTime};
 use crate::model::components::{GrowthCone, Status};
 use crate::model::health::{Counters, Fault, Health};
 use crate::model::integrator::{bring_tissue_to, evaluate_right_hand_side};
+use crate::model::keep::Damage;
+use crate::model::kept::KeptState;
 use crate::model::mechanism::Roster;
 use crate::model::remodel::Unrest;
 use crate::model::shelf::Shelf;
@@ -99,6 +101,27 @@ impl Simulation {
             Some(fault) => Err(fault.clone()),
             None => Ok(()),
         }
+    }
+
+    /// Writes down all state that the scene does not give: between two steps.
+    pub fn keep(&self) -> Vec<u8> {
+        self.world.resource::<KeptState>().write(&self.world)
+    }
+
+    /// Brings a simulation that has just been assembled to the state that [`Self::keep`] wrote down of the same scene. What follows is
+    /// what would have followed then, bit for bit.
+    ///
+    /// # Errors
+    /// The part that does not fit; the simulation is of no use then.
+    pub fn restore(&mut self, kept: &[u8]) -> Result<(), Damage> {
+        let state = self.world.resource::<KeptState>().clone();
+        state.read(&mut self.world, kept)?;
+        let now = self.world.resource::<Clock>().now;
+        self.next_birth = self.births.partition_point(|birth| *birth < now);
+        let stage = self.world.resource::<StageTime>().0;
+        bring_tissue_to(&mut self.world, stage);
+        self.lap("assembly");
+        Ok(())
     }
 
     /// Brings the tissue to the time reached, which idle steps leave behind.

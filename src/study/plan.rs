@@ -1,13 +1,14 @@
 //! What a scene needs before it runs: everything is put together and solved as for a run, but no step is taken.
 
 use super::estimate::{Estimate, Expectation, memory, seconds};
-use super::run::{DPI, RunError, assembled, recorder_options};
+use super::run::{DPI, Records, RunError, assembled, recorder_options};
 use crate::model::clock::Clock;
 use crate::model::components::GrowthCone;
 use crate::model::health::{Counters, Health};
 use crate::model::mechanism::Roster;
 use crate::model::plan::Plan;
 use crate::model::tissue::Tissue;
+use crate::record::files;
 use crate::record::png::scale_for_dpi;
 use crate::record::recorder::Recorder;
 use crate::record::summary::{DerivedConstants, constants};
@@ -60,11 +61,11 @@ pub fn plan(loaded: &Loaded, roster: &Roster, path: &Path) -> Result<ScenePlan, 
     let lifetimes = lifetimes(world, &clock);
     let interval = clock.grid.nearest(loaded.scene.output.trajectory_interval.0).max(1);
     let points = lifetimes.iter().map(|ticks| ticks / interval + 1).sum();
-    let recorder = Recorder::new(&recorder_options(loaded, true), &clock.grid, clock.end);
+    let recorder = Recorder::new(&recorder_options(loaded, Records::ALL), &clock.grid, clock.end);
     let expected = Expectation::of(world, &recorder, points);
     let mesh = &world.resource::<Tissue>().mesh;
     let mut plan = world.resource::<Plan>().clone();
-    tell_outputs(&mut plan, loaded, recorder.pictures_due().len());
+    tell_outputs(&mut plan, loaded, &recorder);
     let found = ScenePlan {
         scene: loaded.scene.name.clone(),
         plan,
@@ -85,18 +86,26 @@ pub fn plan(loaded: &Loaded, roster: &Roster, path: &Path) -> Result<ScenePlan, 
 }
 
 /// The files that a run writes, and what for.
-fn tell_outputs(plan: &mut Plan, loaded: &Loaded, pictures: usize) {
+fn tell_outputs(plan: &mut Plan, loaded: &Loaded, recorder: &Recorder) {
     let output = &loaded.scene.output;
     plan.keep("summary.json", format!("always: measures at {} heights, plan, cost", output.heights.len()));
     plan.keep("manifest.json", "always: what it takes to run the scene again");
-    plan.keep(
-        "trajectories.csv",
-        format!("always: a point of each axon born every {:.3} h", output.trajectory_interval.0),
-    );
+    let each = format!("a point of each axon born every {:.3} h", output.trajectory_interval.0);
+    match output.tables.are_csv() {
+        true => plan.keep("trajectories.csv", format!("always: {each}")),
+        false => plan.leave_out("trajectories.csv", "`output/tables` asks for parquet"),
+    };
+    files::told(output).into_iter().for_each(|(files, when)| plan.keep(files, when));
     let figure = "figure.svg, figure.png";
-    match pictures {
+    match recorder.pictures_due().len() {
         0 => plan.leave_out(figure, "`output/figure_times` names no time"),
-        _ => plan.keep(figure, format!("{pictures} panels, one for each of `output/figure_times`")),
+        panels => plan.keep(figure, format!("{panels} panels, one for each of `output/figure_times`")),
+    }
+    let recording = "recording.bin, report.html";
+    match recorder.frames_due() {
+        0 if output.frames.is_some() => plan.leave_out(recording, "`output/frames` is 0"),
+        0 => plan.leave_out(recording, "more than 20 000 axons; `output/frames` asks for it all the same"),
+        frames => plan.keep(recording, format!("{frames} frames: `output/frames`, and those of the figure")),
     }
 }
 

@@ -1,14 +1,20 @@
 //! One run: a scenario in, a folder of results out.
 
+use super::report::Asked;
 use crate::model::clock::Clock;
 use crate::model::health::Fault;
+use crate::model::keep::{Damage, Keep, KeptBytes};
 use crate::model::mechanism::{Entry, Facts, Roster};
 use crate::model::shelf::Shelf;
 use crate::model::violation::Violation;
+use crate::record::checkpoint::CheckpointError;
+use crate::record::files::{OutputError, Outputs};
 use crate::record::manifest::Manifest;
 use crate::record::output::{WriteError, write_atomically};
 use crate::record::png::{PngError, scale_for_dpi, to_png};
 use crate::record::recorder::{Recorder, RecorderOptions};
+use crate::record::recording::Recording;
+use crate::record::recording::film::FilmTitle;
 use crate::record::scene_figure::FigureError;
 use crate::record::scene_view::scene_figure;
 use crate::record::snapshot::Snapshot;
@@ -45,9 +51,22 @@ pub enum RunError {
     /// The picture has nothing to show.
     #[error("the figure could not be drawn: {0}")]
     Figure(#[from] FigureError),
+    /// A run that cannot go on.
+    #[error("{0}")]
+    Resume(String),
     /// Something that must not happen.
     #[error("internal: {0}")]
     Internal(String),
+}
+
+impl From<OutputError> for RunError {
+    fn from(error: OutputError) -> Self {
+        match error {
+            OutputError::Write(error) => Self::Write(error),
+            OutputError::Damage(damage) => Self::Resume(CheckpointError::from(damage).to_string()),
+            other => Self::Internal(other.to_string()),
+        }
+    }
 }
 
 /// What a finished run leaves in memory.
@@ -56,6 +75,28 @@ pub struct Finished {
     pub summary: Summary,
     /// Trajectories and snapshots.
     pub recorder: Recorder,
+    /// The film of the run, if the scene has frames and they were to be kept.
+    pub recording: Option<Recording>,
+}
+
+/// What is kept of a run besides its summary and the snapshots of its figure.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Records {
+    /// Trajectories.
+    pub trajectories: bool,
+    /// The recording, if the scene has frames.
+    pub frames: bool,
+}
+
+impl Records {
+    /// What a run by itself leaves.
+    pub const ALL: Self = Self { trajectories: true, frames: true };
+    /// Trajectories alone.
+    pub const TRAJECTORIES: Self = Self { trajectories: true, frames: false };
+    /// The recording alone.
+    pub const FRAMES: Self = Self { trajectories: false, frames: true };
+    /// Neither.
+    pub const NOTHING: Self = Self { trajectories: false, frames: false };
 }
 
 /// Reads a scenario for a roster.
@@ -98,10 +139,10 @@ pub fn simulate(
     loaded: &Loaded,
     roster: &Roster,
     path: &Path,
-    keep_trajectories: bool,
+    keep: Records,
     tick: impl FnMut(f64),
 ) -> Result<Finished, RunError> {
-    simulate_from((loaded, &Shelf::default()), roster, path, keep_trajectories, tick)
+    simulate_from((loaded, &Shelf::default()), roster, path, keep, tick)
 }
 
 /// As [`simulate`], with a shelf of what other runs have solved.
@@ -112,23 +153,153 @@ pub fn simulate_from(
     (loaded, shelf): (&Loaded, &Shelf),
     roster: &Roster,
     path: &Path,
-    keep_trajectories: bool,
+    keep: Records,
     mut tick: impl FnMut(f64),
 ) -> Result<Finished, RunError> {
-    let mut simulation = Simulation::assemble_from(loaded, roster, shelf).map_err(|error| run_error(error, path))?;
-    let clock = *simulation.world().resource::<Clock>();
-    let mut recorder = Recorder::new(&recorder_options(loaded, keep_trajectories), &clock.grid, clock.end);
-    let fault = run_to_end(&mut simulation, &mut recorder, &mut tick)?;
-    simulation.bring_tissue_here();
-    let output = &loaded.scene.output;
-    let options = SummaryOptions {
-        scene: loaded.scene.name.clone(),
-        seed: loaded.scene.seed,
-        heights: output.heights.iter().map(|share| share.0).collect(),
-        linkage: output.linkage_distance.0,
-    };
-    let summary = Summary::of(simulation.world(), &options, fault.as_ref());
-    Ok(Finished { summary, recorder })
+    let mut run = Run::begin_from((loaded, shelf), roster, path, keep)?;
+    let ended = run.to_end(|run| {
+        tick(run.simulation.progress());
+        None
+    })?;
+    run.finish(loaded, &ended)
+}
+
+/// A run on its way: the simulation and what has been recorded of it.
+pub struct Run {
+    /// The simulation.
+    pub simulation: Simulation,
+    /// Trajectories and snapshots so far.
+    pub recorder: Recorder,
+    outputs: Outputs,
+}
+
+/// How a run ended.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Ended {
+    /// At its end.
+    Done,
+    /// By a fault.
+    Fault(Fault),
+    /// On the way, because it was stopped.
+    Stopped(Fault),
+}
+
+impl Run {
+    /// A loaded scene at its start.
+    ///
+    /// # Errors
+    /// A scene that cannot be assembled.
+    pub fn begin(loaded: &Loaded, roster: &Roster, path: &Path, keep: Records) -> Result<Self, RunError> {
+        Self::begin_from((loaded, &Shelf::default()), roster, path, keep)
+    }
+
+    fn begin_from(
+        (loaded, shelf): (&Loaded, &Shelf),
+        roster: &Roster,
+        path: &Path,
+        keep: Records,
+    ) -> Result<Self, RunError> {
+        let simulation = Simulation::assemble_from(loaded, roster, shelf).map_err(|error| run_error(error, path))?;
+        let clock = *simulation.world().resource::<Clock>();
+        let recorder = Recorder::new(&recorder_options(loaded, keep), &clock.grid, clock.end);
+        Ok(Self { simulation, recorder, outputs: Outputs::default() })
+    }
+
+    /// Lets a run that has just begun write into `folder`, on its way, the files for other tools that its scene asks for.
+    ///
+    /// # Errors
+    /// A file that could not be written.
+    pub fn writes_into(&mut self, folder: &Path, loaded: &Loaded) -> Result<(), RunError> {
+        let grid = self.simulation.world().resource::<Clock>().grid;
+        self.outputs = Outputs::create(&loaded.scene.output, folder, &grid)?;
+        Ok(())
+    }
+
+    /// Writes down what has been recorded, and how far the files for other tools have come.
+    ///
+    /// # Errors
+    /// A file that cannot be read back.
+    pub fn keep_records(&self) -> Result<Vec<u8>, WriteError> {
+        let mut bytes = Vec::new();
+        self.recorder.keep(&mut bytes);
+        self.outputs.keep(&mut bytes)?;
+        Ok(bytes)
+    }
+
+    /// Brings a run of the same scene that has just begun to what was written down of simulation and records.
+    ///
+    /// # Errors
+    /// The part that does not fit; the run is of no use then.
+    pub fn restore(&mut self, (state, records): (&[u8], &[u8])) -> Result<(), RunError> {
+        let damaged = |damage: Damage| RunError::Resume(CheckpointError::from(damage).to_string());
+        self.simulation.restore(state).map_err(damaged)?;
+        let mut records = KeptBytes::new(records);
+        self.recorder = records.read().map_err(damaged)?;
+        Ok(self.outputs.restore(&mut records)?)
+    }
+
+    /// Steps to the end, or to the fault that ends the run. `between` is called after each step and may stop the run, with the reason.
+    ///
+    /// # Errors
+    /// A record that cannot be kept. A fault while running is no error.
+    pub fn to_end(&mut self, mut between: impl FnMut(&Self) -> Option<String>) -> Result<Ended, RunError> {
+        loop {
+            let Self { simulation, recorder, outputs } = self;
+            let now = simulation.world().resource::<Clock>().now;
+            if recorder.is_due(now) {
+                simulation.bring_tissue_here();
+                recorder.observe(simulation.world()).map_err(|error| RunError::Internal(error.to_string()))?;
+                simulation.lap("record");
+            }
+            if outputs.are_due(now) {
+                simulation.bring_tissue_here();
+                outputs.look(simulation.world())?;
+                simulation.lap("record");
+            }
+            if simulation.is_over() {
+                return Ok(Ended::Done);
+            }
+            if let Err(fault) = simulation.step() {
+                return Ok(Ended::Fault(fault));
+            }
+            if let Some(account) = between(self) {
+                return Ok(Ended::Stopped(Fault { time: self.simulation.time(), account }));
+            }
+        }
+    }
+
+    /// What the run leaves; one that did not come to its end shows where it stands in a last snapshot, if that can be drawn.
+    ///
+    /// # Errors
+    /// A file for other tools that could not be written.
+    pub fn finish(mut self, loaded: &Loaded, ended: &Ended) -> Result<Finished, RunError> {
+        self.simulation.bring_tissue_here();
+        let remarks = self.outputs.finish(self.simulation.world())?;
+        let world = self.simulation.world();
+        let fault = match ended {
+            Ended::Done => None,
+            Ended::Fault(fault) | Ended::Stopped(fault) => {
+                self.recorder.observe_fault(world);
+                Some(fault)
+            }
+        };
+        let output = &loaded.scene.output;
+        let options = SummaryOptions {
+            scene: loaded.scene.name.clone(),
+            seed: loaded.scene.seed,
+            heights: output.heights.iter().map(|share| share.0).collect(),
+            linkage: output.linkage_distance.0,
+        };
+        let title = FilmTitle {
+            scene: loaded.scene.name.clone(),
+            description: loaded.scene.description.clone(),
+            seed: loaded.scene.seed,
+        };
+        let recording = self.recorder.take_film().and_then(|film| film.develop(world, &title));
+        let mut summary = Summary::of(world, &options, fault);
+        summary.notes.extend(self.recorder.given_up.clone().into_iter().chain(remarks));
+        Ok(Finished { summary, recorder: self.recorder, recording })
+    }
 }
 
 /// Puts a scene together and solves what must be solved before the first step.
@@ -146,34 +317,15 @@ fn run_error(error: AssemblyError, path: &Path) -> RunError {
     }
 }
 
-pub(super) fn recorder_options(loaded: &Loaded, keep_trajectories: bool) -> RecorderOptions {
+pub(super) fn recorder_options(loaded: &Loaded, keep: Records) -> RecorderOptions {
     let (output, duration) = (&loaded.scene.output, loaded.scene.time.duration.0);
+    let axons = loaded.scene.populations.values().map(|population| population.count).sum();
+    let frames = if keep.frames { output.frames(axons) } else { 0 };
+    let gaps = f64::from(frames.saturating_sub(1).max(1));
     RecorderOptions {
-        trajectory_interval: keep_trajectories.then_some(output.trajectory_interval.0),
+        trajectory_interval: (keep.trajectories && output.tables.are_csv()).then_some(output.trajectory_interval.0),
         figure_times: output.figure_times.iter().map(|share| share.0 * duration).collect(),
-    }
-}
-
-fn run_to_end(
-    simulation: &mut Simulation,
-    recorder: &mut Recorder,
-    tick: &mut impl FnMut(f64),
-) -> Result<Option<Fault>, RunError> {
-    loop {
-        let now = simulation.world().resource::<Clock>().now;
-        if recorder.is_due(now) {
-            simulation.bring_tissue_here();
-            recorder.observe(simulation.world()).map_err(|error| RunError::Internal(error.to_string()))?;
-            simulation.lap("record");
-        }
-        if simulation.is_over() {
-            return Ok(None);
-        }
-        if let Err(fault) = simulation.step() {
-            recorder.snapshots.push(Snapshot::of(simulation.world()));
-            return Ok(Some(fault));
-        }
-        tick(simulation.progress());
+        frame_times: (0..frames).map(|frame| f64::from(frame) / gaps * duration).collect(),
     }
 }
 
@@ -181,12 +333,17 @@ fn run_to_end(
 ///
 /// # Errors
 /// The file that could not be written, or the picture that could not be drawn.
-pub fn write_results(folder: &Path, loaded: &Loaded, finished: &Finished) -> Result<(), RunError> {
+pub fn write_results(folder: &Path, asked: Asked, finished: &Finished) -> Result<(), RunError> {
+    let loaded = asked.loaded;
     write_json(&folder.join("summary.json"), &finished.summary)?;
     write_json(&folder.join("manifest.json"), &Manifest::of(loaded))?;
+    asked.report_run(folder, finished)?;
     let Recorder { trajectories, snapshots, .. } = &finished.recorder;
     let (table, figure) = rayon::join(
-        || trajectories.write(&folder.join("trajectories.csv")),
+        || match loaded.scene.output.tables.are_csv() {
+            true => trajectories.write(&folder.join("trajectories.csv")),
+            false => Ok(()),
+        },
         || write_figure(folder, loaded, snapshots),
     );
     table?;

@@ -1,13 +1,13 @@
 //! Paired runs of one scene over several seeds: the seed is the unit of statistics.
 
-use super::run::{Finished, RunError, simulate};
+use super::run::{Ended, Finished, Records, Run, RunError};
 use crate::model::mechanism::Roster;
 use crate::model::random::{KeyedRng, Stream};
+use crate::record::leaves;
 use crate::record::statistics::SummaryOverSeeds;
 use crate::record::summary::Summary;
 use crate::scenario::load::Loaded;
 use serde::Serialize;
-use serde_json::Value;
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
@@ -42,13 +42,34 @@ pub fn over_seeds(
     count: u64,
     tick: impl Fn(f64) + Sync,
 ) -> Result<Vec<Finished>, RunError> {
+    over_seeds_until(loaded, roster, path, count, (tick, || None))
+}
+
+/// As [`over_seeds`], until `stop` gives a reason: runs that are then on their way, or have not begun, are left out.
+///
+/// # Errors
+/// As [`over_seeds`].
+pub fn over_seeds_until(
+    loaded: &Loaded,
+    roster: &Roster,
+    path: &Path,
+    count: u64,
+    (tick, stop): (impl Fn(f64) + Sync, impl Fn() -> Option<String> + Sync),
+) -> Result<Vec<Finished>, RunError> {
     let run = |place: usize| {
+        if stop().is_some() {
+            return Ok(None);
+        }
         let mut own = loaded.clone();
         own.scene.seed += place as u64;
-        simulate(&own, roster, path, place == 0, |_| {})
+        let mut run =
+            Run::begin(&own, roster, path, if place == 0 { Records::TRAJECTORIES } else { Records::NOTHING })?;
+        let ended = run.to_end(|_| stop())?;
+        (!matches!(ended, Ended::Stopped(_))).then(|| run.finish(&own, &ended)).transpose()
     };
-    let runs = in_parallel(count as usize, run, tick);
-    runs.into_iter().map(|run| run.unwrap_or_else(|| Err(RunError::Internal("a run was lost".into())))).collect()
+    let runs = in_parallel(count as usize, run, tick).into_iter();
+    let runs = runs.map(|run| run.unwrap_or_else(|| Err(RunError::Internal("a run was lost".into()))));
+    Ok(runs.collect::<Result<Vec<_>, _>>()?.into_iter().flatten().collect())
 }
 
 /// Does `count` pieces of work, each on one thread, as many at once as the present pool has threads. Results come back in the
@@ -101,7 +122,7 @@ pub fn summarise(loaded: &Loaded, runs: &[Finished]) -> Result<SeedsSummary, Run
     }
     Ok(SeedsSummary {
         scene: loaded.scene.name.clone(),
-        seeds: (0..runs.len() as u64).map(|i| loaded.scene.seed + i).collect(),
+        seeds: runs.iter().map(|run| run.summary.seed).collect(),
         complete: runs.iter().all(|run| run.summary.complete),
         measures,
         values,
@@ -116,27 +137,5 @@ pub(super) fn bootstrap(loaded: &Loaded) -> KeyedRng {
 
 /// All numbers of counts and morphology, by their dotted place.
 pub(super) fn leaves(summary: &Summary) -> Result<Vec<(String, f64)>, RunError> {
-    let value = serde_json::to_value((&summary.counts, &summary.morphology))
-        .map_err(|error| RunError::Internal(error.to_string()))?;
-    let mut found = Vec::new();
-    collect("counts", &value[0], &mut found);
-    collect("", &value[1], &mut found);
-    Ok(found)
-}
-
-fn collect(place: &str, value: &Value, found: &mut Vec<(String, f64)>) {
-    // Settings and sample sizes stand among the measures of a run; over seeds they say nothing.
-    const CONSTANTS: [&str; 5] = ["share", "y_um", "linkage_um", "n", "axons"];
-    let inside = |key: &str| if place.is_empty() { key.to_owned() } else { format!("{place}.{key}") };
-    match value {
-        Value::Number(number) => found.extend(number.as_f64().map(|x| (place.to_owned(), x))),
-        Value::Object(keys) => {
-            let measures = keys.iter().filter(|(key, _)| !CONSTANTS.contains(&key.as_str()));
-            measures.for_each(|(key, value)| collect(&inside(key), value, found));
-        }
-        Value::Array(items) => {
-            items.iter().enumerate().for_each(|(i, value)| collect(&inside(&i.to_string()), value, found));
-        }
-        _ => {}
-    }
+    leaves::leaves(&summary.counts, &summary.morphology).map_err(|error| RunError::Internal(error.to_string()))
 }

@@ -12,7 +12,7 @@ use tropism::prelude::{GrowthCone, Journey, Position, Roster, SpringState, Statu
 use tropism::record::recorder::{Recorder, RecorderOptions};
 use tropism::scenario::load::{Loaded, Request, ScenarioErrors};
 use tropism::simulation::Simulation;
-use tropism::study::run::{Finished, read, simulate};
+use tropism::study::run::{Finished, Records, read, simulate};
 
 /// A directory of the test's own that goes when dropped.
 pub struct Folder(pub PathBuf);
@@ -72,7 +72,7 @@ pub fn to_end(simulation: &mut Simulation) {
 
 /// Runs a scene as the program does, with its recorder.
 pub fn recorded(loaded: &Loaded, roster: &Roster) -> Finished {
-    simulate(loaded, roster, "scene.json".as_ref(), true, |_| {}).unwrap_or_else(|error| panic!("{error}"))
+    simulate(loaded, roster, "scene.json".as_ref(), Records::ALL, |_| {}).unwrap_or_else(|error| panic!("{error}"))
 }
 
 /// Runs a loaded scene to its end once, and gives its trajectories as written and its end state.
@@ -80,7 +80,7 @@ pub fn observed(loaded: &Loaded, roster: &Roster) -> (String, Simulation) {
     let mut simulation = Simulation::assemble(loaded, roster).unwrap_or_else(|error| panic!("{error}"));
     let clock = *simulation.world().resource::<Clock>();
     let interval = Some(loaded.scene.output.trajectory_interval.0);
-    let options = RecorderOptions { trajectory_interval: interval, figure_times: Vec::new() };
+    let options = RecorderOptions { trajectory_interval: interval, ..RecorderOptions::default() };
     let mut recorder = Recorder::new(&options, &clock.grid, clock.end);
     loop {
         simulation.bring_tissue_here();

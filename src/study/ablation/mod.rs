@@ -9,12 +9,13 @@ mod figure;
 pub mod report;
 mod table;
 
-use super::run::{RunError, read_document, simulate_from};
+use super::run::{Records, RunError, read_document, simulate_from};
 use super::seeds::{bootstrap, in_parallel, leaves};
 use crate::model::health::Counters;
 use crate::model::mechanism::Roster;
 use crate::model::quantity::Factor;
 use crate::model::shelf::Shelf;
+use crate::record::recording::Recording;
 use crate::record::snapshot::Snapshot;
 use crate::record::statistics::SummaryOverSeeds;
 use crate::scenario::load::{Loaded, ScenarioErrors};
@@ -79,6 +80,9 @@ pub struct Arm {
     /// The end of the first seed's run, if it came there.
     #[serde(skip)]
     pub end: Option<Snapshot>,
+    /// The first seed's run, if it came to its end and the scene has frames.
+    #[serde(skip)]
+    pub recording: Option<Recording>,
 }
 
 /// A run that did not come to its end.
@@ -112,6 +116,7 @@ impl Arm {
             differences: BTreeMap::new(),
             values: BTreeMap::new(),
             end: None,
+            recording: None,
         }
     }
 
@@ -138,6 +143,7 @@ impl Arm {
                     self.values.entry(name).or_insert_with(|| vec![None; count])[place] = Some(value);
                 }
                 self.end = self.end.take().or(ended.end);
+                self.recording = self.recording.take().or(ended.recording);
             }
             Err(account) => self.failures.push(Failure { seed, account }),
         }
@@ -163,6 +169,7 @@ impl Arm {
 struct Ended {
     values: Vec<(String, f64)>,
     end: Option<Snapshot>,
+    recording: Option<Recording>,
 }
 
 /// The sets of mechanisms that are left out: none, each, and, if asked for, each pair; in the order of the roster.
@@ -220,7 +227,8 @@ pub fn ablate(
         let place = job / scenes.len();
         own.scene.seed = seeds[place];
         own.scene.output.figure_times = if place == 0 { vec![Factor(1.0)] } else { Vec::new() };
-        run_one((&own, &shelf), roster, path)
+        let keep = if place == 0 { Records::FRAMES } else { Records::NOTHING };
+        run_one((&own, &shelf), roster, path, keep)
     };
     let runs = in_parallel(scenes.len() * seeds.len(), run, tick);
     let (mut solved, count) = (Solved::default(), runs.len());
@@ -246,8 +254,8 @@ pub fn ablate(
     })
 }
 
-fn run_one(scene: (&Loaded, &Shelf), roster: &Roster, path: &Path) -> (Result<Ended, String>, Counters) {
-    let finished = match simulate_from(scene, roster, path, false, |_| {}) {
+fn run_one(scene: (&Loaded, &Shelf), roster: &Roster, path: &Path, keep: Records) -> (Result<Ended, String>, Counters) {
+    let finished = match simulate_from(scene, roster, path, keep, |_| {}) {
         Ok(finished) => finished,
         Err(error) => return (Err(one_line(error.to_string().lines())), Counters::default()),
     };
@@ -256,7 +264,10 @@ fn run_one(scene: (&Loaded, &Shelf), roster: &Roster, path: &Path) -> (Result<En
     let ended = match &summary.fault {
         Some(fault) => Err(format!("the run ended {fault}")),
         None => leaves(&summary)
-            .map(|values| Ended { values, end: finished.recorder.snapshots.into_iter().next_back() })
+            .map(|values| {
+                let (end, recording) = (finished.recorder.snapshots.into_iter().next_back(), finished.recording);
+                Ended { values, end, recording }
+            })
             .map_err(|error| error.to_string()),
     };
     (ended, counters)

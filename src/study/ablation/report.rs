@@ -4,19 +4,21 @@ use super::Ablation;
 use crate::record::csv::{Cell, CsvTable, RowError};
 use crate::record::manifest::Manifest;
 use crate::record::statistics::SummaryOverSeeds;
-use crate::scenario::load::Loaded;
+use crate::study::report::Asked;
 use crate::study::run::{RunError, write_json, write_picture};
 use std::path::Path;
 
-/// Writes `ablation.json`, `ablation.csv`, `manifest.json` and, if any first run came to its end, `figure.svg` and `figure.png`.
+/// Writes `ablation.json`, `ablation.csv`, `manifest.json` and, if any first run came to its end, `report.html`, `figure.svg` and
+/// `figure.png`.
 ///
 /// # Errors
 /// The file that could not be written, or the picture that could not be drawn.
-pub fn write(folder: &Path, loaded: &Loaded, ablation: &Ablation) -> Result<(), RunError> {
+pub fn write(folder: &Path, asked: Asked, ablation: &Ablation) -> Result<(), RunError> {
     write_json(&folder.join("ablation.json"), ablation)?;
-    write_json(&folder.join("manifest.json"), &Manifest::of(loaded))?;
+    write_json(&folder.join("manifest.json"), &Manifest::of(asked.loaded))?;
     let table = table(ablation).map_err(|error| RunError::Internal(error.to_string()))?;
     table.write(&folder.join("ablation.csv"))?;
+    asked.report_ablation(folder, ablation)?;
     match ablation.figure()? {
         Some(figure) => write_picture(folder, "figure", &figure),
         None => Ok(()),

@@ -315,7 +315,7 @@ impl PlainLoop {
         let half_turn = 0.5 * self.growth.turning_rate * duration;
         let before = turn(&cone.heading, &pull, half_turn);
         let scale = (2.0 * cone.speed / self.laws.persistence_length).sqrt();
-        let after = kick(&before, self.paths.0.increment(cone.axon, start, to).map(|dw| scale * dw), true);
+        let after = kick(&before, [scale * self.paths.0.increment::<1>(cone.axon, start, to)[0], 0.0], true);
         let displacement = (before + after) * (0.5 * cone.speed * duration);
         let rules = WalkRules { border: BorderRule::Slide, stop_at: |cell: u32| self.targets.contains(cell) };
         let (mesh, coordinates) = (&self.tissue.mesh, &configuration.coordinates);

@@ -4,6 +4,7 @@ use super::Chart;
 use super::work_precision::{ErrorKind, Factor, Point, Slope};
 use crate::record::output::write_atomically;
 use crate::record::plot::{Axis, Level, Mark, Plot, Series, Stroke, draw};
+use crate::study::report::Asked;
 use crate::study::run::{RunError, write_json, write_picture};
 use serde::Serialize;
 use std::fmt::Write;
@@ -19,11 +20,11 @@ struct Reported<'a> {
     growth: Vec<Slope>,
 }
 
-/// Writes `chart.json`, `chart.csv` and `chart_<factor>.svg/.png`.
+/// Writes `chart.json`, `chart.csv`, `report.html` and `chart_<factor>.svg/.png`.
 ///
 /// # Errors
 /// The file that could not be written, or the picture that could not be drawn.
-pub fn write(folder: &Path, chart: &Chart) -> Result<(), RunError> {
+pub fn write(folder: &Path, asked: Asked, chart: &Chart) -> Result<(), RunError> {
     let reported = |factor| Reported {
         factor,
         slopes: factor.errors.iter().map(|error| (error.name.as_str(), factor.slopes(error))).collect(),
@@ -45,6 +46,7 @@ pub fn write(folder: &Path, chart: &Chart) -> Result<(), RunError> {
     };
     write_json(&folder.join("chart.json"), &document)?;
     write_atomically(&folder.join("chart.csv"), table(chart).as_bytes())?;
+    asked.report_chart(folder, chart)?;
     for factor in &chart.factors {
         let title = format!("{}: {}", chart.scene, factor.title);
         let drawing = draw(&title, &format!("{} {}", factor.advice, factor.remark), &plots(factor))?;

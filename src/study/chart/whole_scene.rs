@@ -6,7 +6,7 @@ use crate::record::statistics;
 use crate::record::summary::Summary;
 use crate::scenario::load::Loaded;
 use crate::study::laboratory::{Laboratory, Setting};
-use crate::study::run::{RunError, simulate};
+use crate::study::run::{Records, RunError, simulate};
 use std::collections::BTreeMap;
 
 /// Steps over the scene's own, the finest first: it is the reference.
@@ -90,7 +90,7 @@ fn runs(laboratory: &Laboratory, setting: &Setting) -> Result<(Vec<Measures>, Se
     for place in 0..laboratory.seeds {
         let mut own = loaded.clone();
         own.scene.seed += place;
-        let finished = simulate(&own, laboratory.roster, &laboratory.request.path, false, |_| {})?;
+        let finished = simulate(&own, laboratory.roster, &laboratory.request.path, Records::NOTHING, |_| {})?;
         measured.push(finished.summary.cost.seconds.values().sum());
         found.push(measures(&finished.summary));
     }

@@ -31,6 +31,8 @@ pub fn estimate(world: &World, expected: &Expectation, scale: f64) -> Result<Est
     estimate.add("program", PROGRAM);
     estimate.add("mesh", SETTING_UP * tissue.mesh.vertex_count() as f64);
     estimate.add("trajectories", ROW * expected.trajectory_points);
+    // As it is filmed, and once more as it is written.
+    estimate.add("recording", 2.0 * expected.recording_bytes);
     if expected.pictures > 0 {
         let [low, high] = tissue.domain.bounding_box();
         let drawing = bytes_to_draw(expected.pictures, [high[0] - low[0], high[1] - low[1]], scale)?;

@@ -15,6 +15,7 @@ use crate::model::plan::{Each, Plan};
 use crate::model::shafts::Shafts;
 use crate::model::tissue::Tissue;
 use crate::record::recorder::Recorder;
+use crate::record::recording::film::FilmExtent;
 use bevy_ecs::prelude::World;
 use serde::Serialize;
 
@@ -81,6 +82,8 @@ pub struct Expectation {
     pub pictures: usize,
     /// Shaft vertices in all panels together.
     pub drawn_vertices: f64,
+    /// Bytes of the recording in memory, before it is deflated.
+    pub recording_bytes: f64,
 }
 
 /// One cone's life: ticks, and the length of its shaft over that of a segment.
@@ -111,16 +114,20 @@ impl Expectation {
         let stages = world.resource::<Growth>().method.stages() as f64;
         let vertices_at = |instant: u64| lives.iter().map(|life| life.vertices_at(instant)).sum::<f64>();
         let pictures = recorder.pictures_due();
+        let shaft_vertices = vertices_at(clock.end);
+        let cones = world.resource::<Shafts>().count() as f64;
+        let film = FilmExtent { frames: recorder.frames_due() as f64, cones, shaft_vertices };
         Self {
             axons: lives.len() as f64,
             steps,
             stages: steps * stages,
             cone_steps,
             cone_stages: cone_steps * stages,
-            shaft_vertices: vertices_at(clock.end),
+            shaft_vertices,
             trajectory_points: trajectory_points as f64,
             pictures: pictures.len(),
             drawn_vertices: pictures.iter().map(|&instant| vertices_at(instant)).sum(),
+            recording_bytes: if film.frames > 0.0 { film.bytes(world) } else { 0.0 },
         }
     }
 

@@ -22,6 +22,8 @@ const CONE_STAGE: f64 = 1400.0;
 const ROW: f64 = 1500.0;
 /// A figure, whatever it shows: page, fonts, fields, compression (ns).
 const FIGURE: f64 = 3e8;
+/// A byte of the recording as it is filmed: looking, deflating, measures (ns).
+const RECORDED_BYTE: f64 = 120.0;
 /// A shaft vertex in a panel (ns).
 const DRAWN_VERTEX: f64 = 3000.0;
 
@@ -49,6 +51,7 @@ pub fn estimate(world: &World, expected: &Expectation) -> Estimate {
     estimate.add("steps", STEP * expected.steps);
     estimate.add("cones", CONE_STAGE * expected.cone_stages);
     estimate.add("trajectories", ROW * expected.trajectory_points);
+    estimate.add("recording", RECORDED_BYTE * expected.recording_bytes);
     if expected.pictures > 0 {
         estimate.add("figure", FIGURE + DRAWN_VERTEX * expected.drawn_vertices);
     }

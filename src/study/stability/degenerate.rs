@@ -3,7 +3,7 @@
 use super::degenerate_scenes::{Case, scenes};
 use crate::model::mechanism::Roster;
 use crate::record::summary::Counts;
-use crate::study::run::{RunError, read_document, simulate};
+use crate::study::run::{Records, RunError, read_document, simulate};
 use rayon::prelude::*;
 use serde::Serialize;
 
@@ -71,7 +71,7 @@ pub fn run(case: Case, roster: &Roster) -> Outcome {
     };
     let finished = read_document(case.name, case.scene, roster)
         .map_err(RunError::from)
-        .and_then(|loaded| simulate(&loaded, roster, case.name.as_ref(), true, |_| {}));
+        .and_then(|loaded| simulate(&loaded, roster, case.name.as_ref(), Records::TRAJECTORIES, |_| {}));
     match finished {
         Ok(finished) => {
             let summary = finished.summary;

@@ -1,0 +1,168 @@
+//! Outlines from files of other programs: GeoJSON, SVG, Gmsh. On loading a scene the file gives way to the polygon that it describes,
+//! so that everything behind sees a polygon, and the manifest runs again without the file.
+//!
+//! A scene reads no file outside of its own folder: paths are relative to the scenario, without `..`, and no link leads out.
+
+mod geojson;
+mod gmsh;
+mod naming;
+mod svg;
+
+use super::read::read_text;
+use crate::keys;
+use crate::model::quantity::Length;
+use crate::model::violation::Violation;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use serde_json::{Value, json};
+use std::path::{Component, Path, PathBuf};
+
+/// Points of an outline from a file, with those of the lines that name its sides.
+const MOST_POINTS: usize = 20_000;
+
+keys! {
+    /// A file with an outline in it.
+    pub struct OutlineFile {
+        /// The file, relative to the scenario and inside its folder.
+        pub file: String = String::new(),
+        /// How long one unit of the file is.
+        #[schemars(extend("exclusiveMinimum" = 0.0))]
+        pub scale: Length = Length(1.0),
+        /// The largest distance between a curve of an SVG and the straight sides put in its place.
+        #[schemars(extend("exclusiveMinimum" = 0.0))]
+        pub tolerance: Length = Length(0.5),
+    }
+}
+
+/// An outline in a file, by the file's format.
+#[derive(Debug, Clone, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum FiledOutline {
+    /// A polygon of GeoJSON; lines with a `name` along it name its sides.
+    Geojson(OutlineFile),
+    /// Closed shapes of an SVG drawing, y upward from its lower edge; open lines along them name the sides by their `id`.
+    Svg(OutlineFile),
+    /// The border of a Gmsh mesh of triangles, MSH 2.2 or 4.1 in ASCII; physical lines name its sides. The inside is meshed anew.
+    Gmsh(OutlineFile),
+}
+
+/// Closed lines with names of their sides, and open lines that name sides, in units of the file.
+#[derive(Debug, Clone, PartialEq, Default)]
+struct Found {
+    rings: Vec<FoundRing>,
+    lines: Vec<(String, Vec<[f64; 2]>)>,
+}
+
+/// A closed line; a side has the number of its first point.
+#[derive(Debug, Clone, PartialEq, Default)]
+struct FoundRing {
+    points: Vec<[f64; 2]>,
+    names: Vec<Option<String>>,
+}
+
+/// Puts the polygon of the file in the place of `/tissue/outline` if that names one; `folder` is that of the scenario with the key.
+///
+/// # Errors
+/// A violation at that key: a path that leads out of the folder, a file that cannot be read, what is wrong in it and where.
+pub fn take_in(document: &mut Value, folder: &Path) -> Result<(), Violation> {
+    let Some(outline) = document.pointer_mut("/tissue/outline") else { return Ok(()) };
+    let format = outline.as_object().and_then(|keys| keys.keys().next().cloned()).unwrap_or_default();
+    if !["geojson", "svg", "gmsh"].contains(&format.as_str()) {
+        return Ok(());
+    }
+    let at = |key: &str, message: String| Violation::new(format!("/tissue/outline/{format}{key}"), message);
+    let filed: FiledOutline = serde_json::from_value(outline.clone()).map_err(|error| at("", error.to_string()))?;
+    let (FiledOutline::Geojson(keys) | FiledOutline::Svg(keys) | FiledOutline::Gmsh(keys)) = &filed;
+    let text = read_inside(folder, &keys.file).map_err(|message| at("/file", message))?;
+    let found = match &filed {
+        FiledOutline::Geojson(_) => geojson::read(&text),
+        FiledOutline::Svg(keys) => svg::read(&text, keys.tolerance.0 / keys.scale.0),
+        FiledOutline::Gmsh(_) => gmsh::read(&text),
+    };
+    let in_file = |message: String| at("/file", format!("{}: {message}", keys.file));
+    let found = found.map_err(in_file)?;
+    let in_rings: usize = found.rings.iter().map(|ring| ring.points.len()).sum();
+    let count = in_rings + found.lines.iter().map(|(_, line)| line.len()).sum::<usize>();
+    if count > MOST_POINTS {
+        return Err(in_file(format!("{count} points; at most {MOST_POINTS} are taken")));
+    }
+    let rings = naming::named(found).map_err(in_file)?;
+    let written = |(place, ring): (usize, &FoundRing)| {
+        let points: Vec<_> = ring.points.iter().map(|point| point.map(|x| x * keys.scale.0)).collect();
+        let default = if place == 0 { "outer" } else { "hole" };
+        let edges: Vec<_> = ring.names.iter().map(|name| name.as_deref().unwrap_or(default)).collect();
+        json!({ "points": points, "edges": edges })
+    };
+    let mut written: Vec<Value> = rings.iter().enumerate().map(written).collect();
+    let outer = written.remove(0);
+    *outline = json!({ "polygon": { "outer": outer, "holes": written } });
+    Ok(())
+}
+
+/// The text of a file inside a folder.
+fn read_inside(folder: &Path, file: &str) -> Result<String, String> {
+    let path = Path::new(file);
+    let inside = path.components().all(|part| matches!(part, Component::Normal(_) | Component::CurDir));
+    if file.is_empty() || !inside {
+        return Err(format!(
+            "\"{file}\" is not the name of a file in the folder of the scenario, such as \"tissue.svg\" or \"shapes/tissue.svg\""
+        ));
+    }
+    let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
+    let unreadable = |error: std::io::Error| match error.kind() {
+        std::io::ErrorKind::NotFound => format!("{file}: no such file beside the scenario"),
+        _ => format!("{file}: cannot be read: {error}"),
+    };
+    let real = |path: PathBuf| path.canonicalize().map_err(unreadable);
+    let path = real(folder.join(path))?;
+    if !path.starts_with(real(folder.to_owned())?) {
+        return Err(format!("{file}: a link that leads out of the folder of the scenario"));
+    }
+    read_text(&path).map_err(|error| error.to_string())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn folder(name: &str) -> PathBuf {
+        let folder = std::env::temp_dir().join(format!("tropism-outline-{}-{name}", std::process::id()));
+        std::fs::create_dir_all(folder.join("inside")).unwrap();
+        folder
+    }
+
+    #[test]
+    fn a_file_gives_way_to_its_polygon_in_micrometres() {
+        let folder = folder("taken");
+        let square = r#"{"type": "Polygon", "coordinates": [[[0, 0], [2, 0], [2, 1], [0, 1], [0, 0]]]}"#;
+        std::fs::write(folder.join("inside/a.geojson"), square).unwrap();
+        let mut scene = json!({"tissue": {"outline": {"geojson": {"file": "inside/a.geojson", "scale": "1 mm"}}}});
+        take_in(&mut scene, &folder).unwrap();
+        let outer = &scene["tissue"]["outline"]["polygon"]["outer"];
+        assert_eq!(outer["points"], json!([[0.0, 0.0], [2000.0, 0.0], [2000.0, 1000.0], [0.0, 1000.0]]));
+        assert_eq!(outer["edges"], json!(["outer", "outer", "outer", "outer"]));
+        std::fs::remove_dir_all(folder).unwrap();
+    }
+
+    #[test]
+    fn no_path_leads_out_of_the_folder_of_the_scenario() {
+        let folder = folder("out");
+        std::fs::write(folder.join("secret.geojson"), "{}").unwrap();
+        let inside = folder.join("inside");
+        #[cfg(unix)]
+        std::os::unix::fs::symlink(folder.join("secret.geojson"), inside.join("link.geojson")).unwrap();
+        let refusal = |file: &str| {
+            let mut scene = json!({"tissue": {"outline": {"geojson": {"file": file}}}});
+            let error = take_in(&mut scene, &inside).unwrap_err();
+            assert_eq!(error.pointer, "/tissue/outline/geojson/file");
+            error.message
+        };
+        for file in ["../secret.geojson", "/etc/passwd", "", "a/../../secret.geojson"] {
+            assert!(refusal(file).contains("is not the name of a file in the folder"), "{file}");
+        }
+        assert!(refusal("none.geojson").ends_with("no such file beside the scenario"));
+        #[cfg(unix)]
+        assert!(refusal("link.geojson").ends_with("leads out of the folder of the scenario"));
+        std::fs::remove_dir_all(folder).unwrap();
+    }
+}

@@ -1,0 +1,128 @@
+//! The command line: arguments in, exit code out.
+//!
+//! Exit codes: 0 done; 1 a fault while solving, running or writing; 2 a bad scenario or bad arguments; 130 and 143 stopped by SIGINT
+//! and SIGTERM, with what there was written.
+//!
+//! | question | file |
+//! |---|---|
+//! | Which commands and options are there? | [`arguments`], [`pictures`]; what stands below the help: [`examples`] |
+//! | What does a command do? | [`commands`]; one run, watched and resumed: [`running`] |
+//! | What is said, and where? | [`voice`], [`manners`] |
+//! | What does Ctrl-C do? | [`interrupt`] |
+
+mod arguments;
+mod commands;
+mod examples;
+mod interrupt;
+mod manners;
+mod pictures;
+mod running;
+mod voice;
+
+use crate::model::mechanism::Roster;
+use crate::record::output::prepare_folder;
+use crate::scenario::editor_schema::editor_schema;
+use crate::study::ablation::Extent;
+use crate::study::laboratory::Laboratory;
+use crate::study::report::Asked;
+use crate::study::run::{RunError, block_schemas, folder_of};
+use arguments::{Cli, Command};
+use clap::{CommandFactory, Parser};
+use commands::{
+    list_mechanisms, new_mechanism, print_bytes, print_json, run_ablation, run_bench, run_chart, run_plan, run_seeds,
+    run_stability,
+};
+use examples::words;
+use manners::{alarming, completions, drawn, man_page};
+use running::{resume, run_once};
+use std::ffi::OsString;
+use std::process::ExitCode;
+use voice::{alarm, set_voice, unsaid};
+
+/// Runs the program with a roster of mechanisms: the whole of `main`, also for programs that add their own.
+pub fn run(arguments: impl IntoIterator<Item = impl Into<OsString> + Clone>, roster: Roster) -> ExitCode {
+    let arguments: Vec<OsString> = arguments.into_iter().map(Into::into).collect();
+    let words = words(&arguments);
+    let cli = match Cli::try_parse_from(arguments) {
+        Ok(cli) => Cli { words, ..cli },
+        Err(error) => {
+            // Nothing can be done about a standard output that is gone.
+            let _ = error.print();
+            return ExitCode::from(if error.use_stderr() { 2 } else { 0 });
+        }
+    };
+    set_voice(cli.quiet, cli.verbose);
+    let code = on_threads(&cli, || execute(&cli, &roster)).unwrap_or_else(|error| {
+        let account = if let RunError::Scenario(errors) = &error { drawn(errors) } else { error.to_string() };
+        alarm!("{} {account}", alarming("error:"));
+        ExitCode::from(if matches!(error, RunError::Scenario(_) | RunError::Arguments(_)) { 2 } else { 1 })
+    });
+    match unsaid() {
+        Some(reason) if code == ExitCode::SUCCESS => {
+            alarm!("{} standard output: {reason}", alarming("error:"));
+            ExitCode::FAILURE
+        }
+        _ => code,
+    }
+}
+
+fn on_threads<T: Send>(cli: &Cli, work: impl FnOnce() -> Result<T, RunError> + Send) -> Result<T, RunError> {
+    let own = match &cli.command {
+        Some(Command::Plan { threads, .. } | Command::Chart { threads, .. } | Command::Ablate { threads, .. }) => {
+            *threads
+        }
+        Some(Command::Bench { threads, .. }) => Some(*threads),
+        Some(Command::Resume { threads, .. }) => *threads,
+        _ => None,
+    };
+    let threads = own.or(cli.threads).unwrap_or(0) as usize;
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(threads)
+        .build()
+        .map_err(|error| RunError::Internal(error.to_string()))?;
+    pool.install(work)
+}
+
+fn execute(cli: &Cli, roster: &Roster) -> Result<ExitCode, RunError> {
+    match &cli.command {
+        Some(Command::Plan { scene, json, .. }) => return run_plan(scene, *json, roster),
+        Some(Command::Ablate { scene, out, seeds, pairs, .. }) => {
+            return run_ablation(cli, scene, out.as_ref(), Extent { seeds: *seeds, pairs: *pairs }, roster);
+        }
+        Some(Command::Chart { scene, out, only, repetitions, seeds, .. }) => {
+            let (request, _) = scene.settled(roster)?;
+            let laboratory =
+                Laboratory { request: &request, roster, repetitions: *repetitions as usize, seeds: *seeds };
+            return run_chart(cli, &laboratory, out.as_ref(), only);
+        }
+        Some(Command::Bench { scene, out, axons, repetitions, .. }) => {
+            let (request, _) = scene.settled(roster)?;
+            let laboratory = Laboratory { request: &request, roster, repetitions: *repetitions as usize, seeds: 1 };
+            return run_bench(&laboratory, out.as_ref(), axons);
+        }
+        Some(Command::Resume { folder, checkpoint, .. }) => return resume(folder, roster, *checkpoint),
+        Some(Command::Figure(arguments)) => return arguments.draw(),
+        Some(Command::Movie(arguments)) => return arguments.make(),
+        Some(Command::Stability { out }) => return run_stability(out, roster),
+        Some(Command::Mechanisms { name, json }) => return list_mechanisms(name.as_deref(), *json, roster),
+        Some(Command::Schema) => return print_json(&editor_schema(&block_schemas(roster))),
+        Some(Command::Completions { shell }) => return print_bytes(&completions(Cli::command(), *shell)),
+        Some(Command::Man) => return print_bytes(&man_page(Cli::command())),
+        Some(Command::NewMechanism { name, path, tropism }) => {
+            return new_mechanism(name, path, tropism.as_deref(), roster);
+        }
+        None => {}
+    }
+    let loaded = cli.scene.load(roster)?;
+    let folder = folder_of(cli.out.as_ref(), &loaded.scene.name);
+    prepare_folder(&folder)?;
+    match cli.seeds {
+        None => run_once(
+            (Asked { loaded: &loaded, command: &cli.words }, &cli.scene.path()),
+            roster,
+            &folder,
+            cli.checkpoint,
+        ),
+        Some(count) => run_seeds(cli, roster, &loaded, &folder, count),
+    }
+}

@@ -1,0 +1,230 @@
+//! Files for other tools, outlines from files, and terminal manners, seen from outside. The readers themselves try the files in
+//! `.ci/readers`.
+
+mod common;
+
+use common::Folder;
+use serde_json::{Value, json};
+use std::path::Path;
+use std::process::{Command, Output};
+
+fn scene() -> Value {
+    json!({
+        "tissue": { "outline": { "rectangle": { "width": 300, "height": 200 } }, "mesh_size": 40 },
+        "time": { "duration": 4, "step": "4 min" },
+        "populations": { "axons": { "count": 6, "births": { "uniform": { "from": 0, "to": 1 } } } },
+        "matrix": { "motion": { "top": { "outward": 0.1 } , "bottom": { "outward": 0.0 } } },
+        "borders": {}, "heading_noise": {}
+    })
+}
+
+fn tropism(folder: &Folder, arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_tropism")).args(arguments).current_dir(&folder.0).output().unwrap()
+}
+
+fn errors(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+fn with_scene(scene: &Value) -> Folder {
+    let folder = Folder::new();
+    folder.write("scene.json", &serde_json::to_string_pretty(scene).unwrap());
+    folder
+}
+
+/// Runs a scene that must end well.
+fn run(folder: &Folder, arguments: &[&str]) -> Output {
+    let output = tropism(folder, &[&["scene.json"], arguments].concat());
+    assert_eq!(output.status.code(), Some(0), "{}", errors(&output));
+    output
+}
+
+/// Names of the files in a folder, sorted.
+fn names(folder: impl AsRef<Path>) -> Vec<String> {
+    let mut names: Vec<_> =
+        std::fs::read_dir(folder).unwrap().map(|f| f.unwrap().file_name().into_string().unwrap()).collect();
+    names.sort();
+    names
+}
+
+const ALL: [&str; 10] = [
+    "--set",
+    "/output/tables=both",
+    "--set",
+    "/output/measures={\"interval\": \"1 h\"}",
+    "--set",
+    "/output/axons={}",
+    "--set",
+    "/output/swc={\"interval\": 3}",
+    "--set",
+    "/output/vtu={\"tissue\": {}, \"fields\": {\"interval\": 2}, \"shafts\": {\"interval\": 2}}",
+];
+
+#[test]
+fn a_scene_chooses_its_files_each_with_its_own_interval() {
+    let folder = with_scene(&scene());
+    run(&folder, &ALL);
+    let out = folder.0.join("out/scene");
+    let expected = [
+        "axons.csv",
+        "axons.parquet",
+        "figure.png",
+        "figure.svg",
+        "manifest.json",
+        "measures.csv",
+        "measures.parquet",
+        "recording.bin",
+        "report.html",
+        "summary.json",
+        "swc",
+        "trajectories.csv",
+        "trajectories.parquet",
+        "vtu",
+    ];
+    assert_eq!(names(&out), expected);
+    assert_eq!(names(out.join("swc")), ["0000", "0001", "0002"], "at 0, 3 and 4 h");
+    assert_eq!(names(out.join("swc/0002")).len(), 6);
+    assert_eq!(names(out.join("vtu/tissue")), ["0000.vtu"], "at the end only");
+    assert_eq!(names(out.join("vtu/shafts")), ["0000.vtu", "0001.vtu", "0002.vtu"]);
+    let pvd = std::fs::read_to_string(out.join("vtu/shafts.pvd")).unwrap();
+    assert!(pvd.contains("timestep=\"2\" part=\"0\" file=\"shafts/0001.vtu\""), "{pvd}");
+    assert_eq!(std::fs::read_to_string(out.join("measures.csv")).unwrap().lines().count(), 6, "0 to 4 h and the head");
+    assert_eq!(std::fs::read_to_string(out.join("axons.csv")).unwrap().lines().count(), 7);
+    // Parquet alone takes the place of the text; fewer axons leave none of an earlier run.
+    run(
+        &folder,
+        &["--set", "/output/tables=parquet", "--set", "/output/swc={}", "--set", "/populations/axons/count=2"],
+    );
+    let alone = names(out.join("swc"));
+    assert_eq!(alone.iter().filter(|name| name.ends_with(".swc")).count(), 2, "{alone:?}");
+}
+
+#[test]
+fn the_lengths_of_trees_are_those_of_the_summary_and_single_points_are_listed() {
+    let folder = with_scene(&scene());
+    let still = run(&folder, &["--set", "/output/swc={}", "--set", "/populations/axons/speed=0"]);
+    let words = "note: swc: 0 files; 6 axons are a single point and in none: 0, 1, 2, 3, 4, 5";
+    assert!(errors(&still).contains(words), "{}", errors(&still));
+    run(&folder, &["--set", "/output/swc={}", "--set", "/output/axons={}"]);
+    let out = folder.0.join("out/scene");
+    let summary: Value = serde_json::from_str(&std::fs::read_to_string(out.join("summary.json")).unwrap()).unwrap();
+    let stated = summary["morphology"]["length_um"]["mean"].as_f64().unwrap() * 6.0;
+    let mut total = 0.0;
+    for name in names(out.join("swc")) {
+        let text = std::fs::read_to_string(out.join("swc").join(name)).unwrap();
+        let rows: Vec<Vec<f64>> = text
+            .lines()
+            .filter(|line| !line.starts_with('#'))
+            .map(|line| line.split(' ').map(|entry| entry.parse().unwrap()).collect())
+            .collect();
+        for (place, row) in rows.iter().enumerate() {
+            assert_eq!((row[0], row[1], row[4], row[5]), (place as f64 + 1.0, 2.0, 0.0, 0.5));
+            if row[6] > 0.0 {
+                let before = &rows[row[6] as usize - 1];
+                total += (row[2] - before[2]).hypot(row[3] - before[3]);
+            }
+        }
+    }
+    assert!((total - stated).abs() < 1e-9 * stated, "{total} instead of {stated}");
+}
+
+#[test]
+fn sweeps_write_little_and_the_plan_names_what_a_run_writes() {
+    let folder = with_scene(&scene());
+    run(&folder, &[&ALL[..], &["--seeds", "2"]].concat());
+    assert_eq!(
+        names(folder.0.join("out/scene")),
+        ["figure.png", "figure.svg", "manifest.json", "summary.json", "trajectories.csv"]
+    );
+    let output = tropism(&folder, &[&["plan", "scene.json"], &ALL[..]].concat());
+    let words = String::from_utf8_lossy(&output.stdout).into_owned();
+    for part in ["swc/ ", "every 3.000 h", "vtu/tissue.pvd, vtu/tissue/", "measures.csv, measures.parquet"] {
+        assert!(words.contains(part), "`{part}` is missing in:\n{words}");
+    }
+}
+
+#[test]
+fn what_is_written_changes_no_result() {
+    let folder = with_scene(&scene());
+    run(&folder, &["--out", "bare"]);
+    run(&folder, &[&ALL[..], &["--out", "full"]].concat());
+    let [bare, full] = ["bare", "full"].map(|run| std::fs::read(folder.0.join(run).join("trajectories.csv")).unwrap());
+    assert!(bare == full);
+}
+
+#[test]
+fn an_outline_from_a_file_is_in_the_manifest_and_a_bad_one_is_refused_with_its_place() {
+    let mut scene = scene();
+    scene["tissue"]["outline"] = json!({ "geojson": { "file": "tissue.geojson", "scale": "0.1 mm" } });
+    let folder = with_scene(&scene);
+    let line = |name: &str, y: u8| {
+        format!(
+            r#"{{"type": "Feature", "properties": {{"name": "{name}"}}, "geometry": {{"type": "LineString", "coordinates": [[0, {y}], [3, {y}]]}}}}"#
+        )
+    };
+    let square = r#"{"type": "Feature", "properties": {}, "geometry": {"type": "Polygon", "coordinates": [[[0, 0], [3, 0], [3, 2], [0, 2], [0, 0]]]}}"#;
+    let text = format!(
+        r#"{{"type": "FeatureCollection", "features": [{square}, {}, {}]}}"#,
+        line("bottom", 0),
+        line("top", 2)
+    );
+    folder.write("tissue.geojson", &text);
+    run(&folder, &[]);
+    let manifest = std::fs::read_to_string(folder.0.join("out/scene/manifest.json")).unwrap();
+    let manifest: Value = serde_json::from_str(&manifest).unwrap();
+    let outer = &manifest["scenario"]["tissue"]["outline"]["polygon"]["outer"];
+    assert_eq!(outer["edges"], json!(["bottom", "outer", "top", "outer"]));
+    assert_eq!(outer["points"][2], json!([300.0, 200.0]));
+    folder.write("tissue.geojson", "{\"type\": \"Polygon\",\n \"coordinates\": 3}");
+    let output = tropism(&folder, &["scene.json"]);
+    assert_eq!(output.status.code(), Some(2));
+    let said = errors(&output);
+    assert!(said.contains("/tissue/outline/geojson/file: tissue.geojson: no list `coordinates`"), "{said}");
+    assert!(said.contains("^^^^^^^^^^^^^^^^"), "the file's name is marked in the scenario: {said}");
+}
+
+#[test]
+fn an_error_is_drawn_at_its_place_in_the_file() {
+    let folder = Folder::new();
+    folder.write("scene.json", "{\n  \"time\": { \"stepp\": 1 },\n  \"seed\": -1\n}\n");
+    let output = tropism(&folder, &["scene.json", "--set", "/growth=3"]);
+    let expected = "error: scene.json: 3 problems
+  1. /time/stepp: unknown key; did you mean `step`? (keys here: duration, step, method, tolerance)
+      --> scene.json:2:13
+     2 |   \"time\": { \"stepp\": 1 },
+       |             ^^^^^^^
+  2. /seed: -1 is outside what is possible: seed ≥ 0
+      --> scene.json:3:11
+     3 |   \"seed\": -1
+       |           ^^
+  3. /growth: 3 is not an object with the keys ";
+    assert!(errors(&output).starts_with(expected), "{}", errors(&output));
+    assert!(!errors(&output).contains('\u{1b}'), "no colours without a terminal");
+    folder.write("scene.json", "{\n  \"seed\": 1,,\n}\n");
+    let said = errors(&tropism(&folder, &["scene.json"]));
+    assert!(said.ends_with("     2 |   \"seed\": 1,,\n       |             ^\n"), "{said}");
+}
+
+#[test]
+fn quiet_says_nothing_and_verbose_says_the_phases() {
+    let folder = with_scene(&scene());
+    let output = run(&folder, &["--quiet"]);
+    assert_eq!((output.stdout.as_slice(), errors(&output).as_str()), (&b""[..], ""));
+    let output = run(&folder, &["-v"]);
+    assert!(String::from_utf8_lossy(&output.stdout).contains("  integrate: "));
+    assert!(!tropism(&folder, &["plan", "scene.json", "--quiet"]).stdout.is_empty(), "what is asked for is said");
+    assert_eq!(tropism(&folder, &["scene.json", "--quiet", "-v"]).status.code(), Some(2));
+}
+
+#[test]
+fn completions_and_the_man_page_name_every_command() {
+    let folder = Folder::new();
+    for shell in ["bash", "zsh", "fish", "elvish", "powershell"] {
+        let text = tropism(&folder, &["completions", shell]).stdout;
+        assert!(String::from_utf8(text).unwrap().contains("new-mechanism"), "{shell}");
+    }
+    let page = String::from_utf8(tropism(&folder, &["man"]).stdout).unwrap();
+    for part in [".TH", "ABLATE", "STABILITY", "NEW\\-MECHANISM", "\\-\\-without"] {
+        assert!(page.contains(part) || page.contains(&part.replace("\\-", "-")), "`{part}` is missing");
+    }
+}

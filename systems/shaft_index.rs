@@ -11,15 +11,17 @@
 //! more than is near and are sorted; what is not within reach adds exactly nothing, so results are those of looking at every segment of
 //! every shaft, to the last bit.
 
+mod asking;
 mod places;
 mod squares;
 
+pub use asking::Asking;
+
 use crate::model::births::Origin;
 use crate::model::shafts::{BLOCK, Struck};
-use crate::numerics::contact_integral::Felt;
 use crate::numerics::locate::MaterialPoint;
 use crate::numerics::polylines::{Part, meeting};
-use crate::numerics::segments::{ContactPull, Contacts, Segments};
+use crate::numerics::segments::Segments;
 use crate::prelude::*;
 use nalgebra::Vector2;
 use places::{BYTES_A_BLOCK, Line, Places};
@@ -37,6 +39,9 @@ const PART: &str = "shaft index";
 const SIDE: f64 = 3.0;
 /// Room for ‖F⁻¹‖ to grow before lists are made anew.
 const ROOM: f64 = 1.05;
+/// Cones that are served together: few enough for what they look at to stay in the processor's caches, many enough that little is
+/// looked at by two batches.
+const BATCH: usize = 4096;
 /// Cones that one task serves: few enough to spread a crowded square over threads.
 const TASK: usize = 32;
 
@@ -51,48 +56,6 @@ pub enum Search {
     Tree,
     /// By looking at every segment of every shaft: slow, and there to be compared with.
     All,
-}
-
-/// A cone that asks for its neighbours.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Asking {
-    /// Place of the cone, which is the number of its own shaft.
-    pub index: u32,
-    /// Index of its population.
-    pub population: u16,
-    /// Material site.
-    pub site: Site,
-    /// Position (µm).
-    pub position: Vector3<f64>,
-    /// Unit heading.
-    pub heading: Vector3<f64>,
-}
-
-impl Asking {
-    /// All growing cones, in their order.
-    pub fn all(cones: &Cones) -> Vec<Self> {
-        cones.collect(|cone, spring| Self {
-            index: cone.index as u32,
-            population: cone.identity.population,
-            site: cone.site,
-            position: cone.position,
-            heading: spring.heading,
-        })
-    }
-
-    /// What the cone makes of segments other than its own by a law, times its adhesion to their kinds.
-    #[inline]
-    pub fn sum(
-        &self,
-        contacts: &mut Contacts<2>,
-        segments: &Segments<2>,
-        felt_by: (&Felt, &impl ContactPull<2>),
-        adhesion: &[f64],
-    ) -> Vector3<f64> {
-        let state = (self.position.xy().into(), self.heading.xy().into());
-        let [x, y] = contacts.sum(state, segments, self.index, felt_by, adhesion);
-        Vector3::new(x, y, 0.0)
-    }
 }
 
 /// Where a cone that asks sits.
@@ -166,17 +129,20 @@ impl ShaftIndex {
         let mut order: Vec<Seat> = cones.par_iter().zip(0..cones.len() as u32).map(seat).collect();
         order.par_sort_unstable();
         self.prepare(scene, &order);
-        let serve = |(segments, parts, work): &mut (Segments<2>, Vec<Part>, S), task: &[Seat]| -> Vec<_> {
-            let mut found = Vec::with_capacity(task.len());
-            for group in task.chunk_by(Seat::shares_square) {
-                self.gather(scene, group, cones, (segments, parts));
-                found.extend(group.iter().map(|seat| (seat.cone, act(work, &cones[seat.cone as usize], segments))));
-            }
-            found
-        };
-        let tasks: Vec<Vec<(u32, T)>> = order.par_chunks(TASK).map_init(Default::default, serve).collect();
         let mut found: Vec<Option<T>> = std::iter::repeat_with(|| None).take(cones.len()).collect();
-        tasks.into_iter().flatten().for_each(|(i, value)| found[i as usize] = Some(value));
+        for batch in order.chunks(BATCH) {
+            self.place(scene, batch);
+            let serve = |(segments, parts, work): &mut (Segments<2>, Vec<Part>, S), task: &[Seat]| -> Vec<_> {
+                let mut found = Vec::with_capacity(task.len());
+                for group in task.chunk_by(Seat::shares_square) {
+                    self.gather(scene, group, cones, (segments, parts));
+                    found.extend(group.iter().map(|seat| (seat.cone, act(work, &cones[seat.cone as usize], segments))));
+                }
+                found
+            };
+            let tasks: Vec<Vec<(u32, T)>> = batch.par_chunks(TASK).map_init(Default::default, serve).collect();
+            tasks.into_iter().flatten().for_each(|(i, value)| found[i as usize] = Some(value));
+        }
         found.into_iter().flatten().collect()
     }
 
@@ -197,8 +163,12 @@ impl ShaftIndex {
             Search::Tree => self.ask_for_missing(order, scene.shafts.longest),
             Search::Grid => {}
         }
+    }
+
+    /// Finds where everything is that a batch looks at.
+    fn place(&mut self, scene: &ShaftScene, batch: &[Seat]) {
         let mut places = std::mem::take(&mut self.places);
-        places.find(scene, order.chunk_by(Seat::shares_square).flat_map(|group| self.near(group)));
+        places.find(scene, batch.chunk_by(Seat::shares_square).flat_map(|group| self.near(group)));
         self.places = places;
     }
 

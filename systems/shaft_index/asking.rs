@@ -1,0 +1,47 @@
+//! A cone that looks at shafts.
+
+use crate::numerics::contact_integral::Felt;
+use crate::numerics::segments::{ContactPull, Contacts, Segments};
+use crate::prelude::*;
+
+/// A cone that asks for its neighbours.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Asking {
+    /// Place of the cone, which is the number of its own shaft.
+    pub index: u32,
+    /// Index of its population.
+    pub population: u16,
+    /// Material site.
+    pub site: Site,
+    /// Position (µm).
+    pub position: Vector3<f64>,
+    /// Unit heading.
+    pub heading: Vector3<f64>,
+}
+
+impl Asking {
+    /// All growing cones, in their order.
+    pub fn all(cones: &Cones) -> Vec<Self> {
+        cones.collect(|cone, spring| Self {
+            index: cone.index as u32,
+            population: cone.identity.population,
+            site: cone.site,
+            position: cone.position,
+            heading: spring.heading,
+        })
+    }
+
+    /// What the cone makes of segments other than its own by a law, times its adhesion to their kinds.
+    #[inline]
+    pub fn sum(
+        &self,
+        contacts: &mut Contacts<2>,
+        segments: &Segments<2>,
+        felt_by: (&Felt, &impl ContactPull<2>),
+        adhesion: &[f64],
+    ) -> Vector3<f64> {
+        let state = (self.position.xy().into(), self.heading.xy().into());
+        let [x, y] = contacts.sum(state, segments, self.index, felt_by, adhesion);
+        Vector3::new(x, y, 0.0)
+    }
+}

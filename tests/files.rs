@@ -212,7 +212,9 @@ fn quiet_says_nothing_and_verbose_says_the_phases() {
     assert_eq!((output.stdout.as_slice(), errors(&output).as_str()), (&b""[..], ""));
     let output = run(&folder, &["-v"]);
     assert!(String::from_utf8_lossy(&output.stdout).contains("  integrate: "));
-    assert!(!tropism(&folder, &["plan", "scene.json", "--quiet"]).stdout.is_empty(), "what is asked for is said");
+    for order in [["plan", "scene.json", "--quiet"], ["--quiet", "plan", "scene.json"]] {
+        assert!(!tropism(&folder, &order).stdout.is_empty(), "what is asked for is said: {order:?}");
+    }
     assert_eq!(tropism(&folder, &["scene.json", "--quiet", "-v"]).status.code(), Some(2));
 }
 

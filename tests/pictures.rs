@@ -118,6 +118,35 @@ fn what_is_not_there_is_named_with_what_is() {
 }
 
 #[test]
+fn a_turning_assay_says_the_mean_angle_that_the_summary_says() {
+    let folder = Folder::new();
+    let mut scene: Value = serde_json::from_str(include_str!("../scenarios/turning_assay.json")).unwrap();
+    scene["populations"]["assayed"]["count"] = json!(40);
+    folder.write("scene.json", &scene.to_string());
+    done(&tropism(&folder, &["scene.json", "--out", "assayed"]));
+    done(&tropism(&folder, &["figure", "assayed", "--assay"]));
+    let drawn = text(folder.0.join("assayed/assay.svg"));
+    let summary: Value = serde_json::from_str(&text(folder.0.join("assayed/summary.json"))).unwrap();
+    // The gradient is to the left of all of them, so that toward it is counter-clockwise. Positions are recorded in steps of 5 nm.
+    let mean = summary["morphology"]["turning_angle_deg"]["mean"].as_f64().unwrap();
+    assert!(mean > 5.0 && drawn.contains(&format!(">{mean:.1} ± ")), "{mean}");
+    assert!(drawn.contains("n = 40)") && folder.0.join("assayed/assay.png").exists());
+    for wrong in [&["--time", "0.2,0.4"][..], &["assayed"], &["--size", "85mm"], &["--cue", "none"], &["--time", "9h"]]
+    {
+        refused(&folder, &[&["figure", "assayed", "--assay"], wrong].concat());
+    }
+}
+
+#[test]
+fn seeds_leave_the_density_of_the_shafts_of_all_of_them() {
+    let folder = with_run();
+    done(&tropism(&folder, &["first.json", "--seeds", "3", "--out", "seeds"]));
+    let drawn = text(folder.0.join("seeds/seeds.svg"));
+    assert!(drawn.contains("t = 4 h, 3 seeds") && folder.0.join("seeds/seeds.png").exists());
+    assert!(text(folder.0.join("seeds/figure.svg")).contains("<path") && !drawn.contains("growing"));
+}
+
+#[test]
 fn a_movie_has_as_many_frames_as_asked_for() {
     let folder = with_run();
     assert_eq!(done(&tropism(&folder, &["movie", "out/first", "--width", "200"])), "out/first/movie.gif\n");

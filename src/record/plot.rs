@@ -17,6 +17,8 @@ pub enum Stroke {
     Line,
     /// A dashed line.
     Dashed,
+    /// A hair's breadth, for many lines on top of each other.
+    Hair,
     /// Marks alone.
     Marks,
     /// A line through marks.

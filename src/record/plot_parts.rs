@@ -70,7 +70,11 @@ pub(super) fn draw_polylines(svg: &mut Svg, pieces: &[Vec<[f64; 2]>], colour: &s
     if data.is_empty() {
         return;
     }
-    let (colour, width) = if stroke == Stroke::Underlay { (UNDERLAY, "7") } else { (colour, "1.5") };
+    let (colour, width) = match stroke {
+        Stroke::Underlay => (UNDERLAY, "7"),
+        Stroke::Hair => (colour, "0.4"),
+        _ => (colour, "1.5"),
+    };
     let mut style = vec![("d", data.as_str()), ("fill", "none"), ("stroke", colour), ("stroke-width", width)];
     if stroke == Stroke::Dashed {
         style.push(("stroke-dasharray", "5 3"));

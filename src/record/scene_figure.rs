@@ -2,8 +2,8 @@
 //!
 //! All panels share one scale and one frame of axes, so that the tissue is seen to stretch from panel to panel. The cues'
 //! concentrations are drawn on a logarithmic scale common to all panels, one ink an effect (see [`super::colour`]).
-//! More than [`MOST_LINES`] shafts in a panel are drawn as a density instead of lines, so that a figure of any run stays
-//! light. [`draw`] draws; [`super::png::to_png`] makes a picture of it.
+//! More than [`MOST_LINES`] shafts in a panel, unless a figure says otherwise, are drawn as a density instead of lines, so that a figure
+//! of any run stays light. [`draw`] draws; [`super::png::to_png`] makes a picture of it.
 
 use super::colour::Effect;
 use super::raster;
@@ -14,7 +14,7 @@ use super::svg::Svg;
 use super::theme;
 use rayon::prelude::*;
 
-/// More shafts than this in any panel, and the whole figure shows their density instead of lines.
+/// The usual number of shafts in a panel beyond which their density is shown.
 pub const MOST_LINES: usize = 3000;
 
 /// What has become of a growth cone.
@@ -119,6 +119,8 @@ pub struct SceneFigure {
     pub width: Option<f64>,
     /// Whether the outline of the first panel is repeated in panels whose tissue has another shape.
     pub compare_outlines: bool,
+    /// More shafts than this in any panel, and the whole figure shows their density instead of lines.
+    pub most_lines: usize,
 }
 
 impl SceneFigure {
@@ -131,6 +133,7 @@ impl SceneFigure {
             columns: None,
             width: None,
             compare_outlines: true,
+            most_lines: MOST_LINES,
         }
     }
 }

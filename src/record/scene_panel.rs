@@ -6,7 +6,7 @@ use super::markers::draw_markers;
 use super::png::encode;
 use super::polyline::simplify;
 use super::raster::{Coverage, Sheet, Triangles, paint_cells};
-use super::scene_figure::{BorderLine, FigureError, MOST_LINES, Panel, SceneFigure, TipStatus};
+use super::scene_figure::{BorderLine, FigureError, Panel, SceneFigure, TipStatus};
 use super::svg::{Anchor, Label, Svg, number, path_data};
 use super::theme::{self, Font};
 use rayon::prelude::*;
@@ -84,7 +84,7 @@ impl<'a> PanelPainter<'a> {
     pub(super) fn of(figure: &'a SceneFigure, view: &View) -> Self {
         let panels = &figure.panels;
         let most = panels.iter().map(|panel| panel.shafts.len()).max().unwrap_or(0);
-        let dense = most > MOST_LINES;
+        let dense = most > figure.most_lines;
         let coverage = |panel: &Panel| cover(panel, view).map_or(0, |coverage| coverage.maximum());
         let shown =
             |status: &TipStatus| !dense && panels.iter().any(|p| p.tips.iter().any(|tip| tip.status == *status));

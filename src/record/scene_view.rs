@@ -17,6 +17,25 @@ pub fn scene_figure(title: &str, subtitle: &str, snapshots: &[Snapshot]) -> Resu
     draw(&SceneFigure::new(title, subtitle, panels))
 }
 
+/// The figure of several runs of one scene, one panel a snapshot: the density of the shafts of all of them, over tissue and cues of
+/// the first.
+///
+/// # Errors
+/// As [`scene_figure`].
+pub fn pooled_figure(title: &str, subtitle: &str, runs: &[&[Snapshot]]) -> Result<Svg, FigureError> {
+    let Some((first, others)) = runs.split_first() else { return Err(FigureError::NoPanel) };
+    let pooled = |(place, snapshot): (usize, &Snapshot)| {
+        let further = others.iter().filter_map(|run| run.get(place));
+        let label = format!("t = {} h, {} seeds", rounded(snapshot.time), runs.len());
+        let mut panel = panel(label, snapshot);
+        panel.shafts.extend(further.flat_map(|snapshot| snapshot.shafts.iter().cloned()));
+        panel.tips.clear();
+        panel
+    };
+    let panels = first.iter().enumerate().map(pooled).collect();
+    draw(&SceneFigure { most_lines: 0, ..SceneFigure::new(title, subtitle, panels) })
+}
+
 /// One snapshot as a panel with a label. Cues that nothing turns by are left out.
 pub fn panel(label: String, snapshot: &Snapshot) -> Panel {
     let border = |(name, points): &(String, Vec<[f64; 2]>)| BorderLine { name: name.clone(), points: points.clone() };

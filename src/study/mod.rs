@@ -2,6 +2,7 @@
 
 pub mod ablation;
 pub mod accuracy;
+pub mod assay;
 pub mod bench;
 pub mod chart;
 pub mod estimate;

@@ -1,11 +1,13 @@
 //! Pictures of finished runs, from their recordings: figures at any time or side by side, and movies.
 
+use super::assay::Assay;
 use super::run::RunError;
 use crate::model::observables::Effect;
 use crate::record::movie::strip::{frame, outline};
 use crate::record::movie::{MovieError, MovieFormat, Pace, encode};
 use crate::record::moving_figure::MovingFigure;
 use crate::record::output::write_atomically;
+use crate::record::plot;
 use crate::record::png::{scale_for_dpi, to_png};
 use crate::record::recording::{self, Recording};
 use crate::record::scene_figure::{FigureError, Panel, SceneFigure, draw};
@@ -30,7 +32,9 @@ pub struct FigureOfRuns {
     pub cues: Vec<String>,
     /// Width (µm); none chooses by the number of panels.
     pub width: Option<f64>,
-    /// File to write, `.svg` or `.png`, or both without an ending; none for `picture` in the first run's folder.
+    /// Whether to draw the paths as a turning assay does, from one start, and how their turning angles are spread.
+    pub assay: bool,
+    /// File to write, `.svg` or `.png`, or both without an ending; none for `picture` (`assay`) in the first run's folder.
     pub out: Option<PathBuf>,
 }
 
@@ -65,7 +69,7 @@ impl FigureOfRuns {
     pub fn write(&self) -> Result<Vec<PathBuf>, RunError> {
         let runs: Vec<Recorded> = self.runs.iter().map(|run| Recorded::open(run)).collect::<Result<_, _>>()?;
         let files = self.files(&runs)?;
-        let figure = draw(&self.figure(&runs)?).map_err(refused)?;
+        let figure = if self.assay { self.assay(&runs)? } else { draw(&self.figure(&runs)?).map_err(refused)? };
         for file in &files {
             write_atomically(file, &contents(&figure, file)?)?;
         }
@@ -75,7 +79,7 @@ impl FigureOfRuns {
     fn files(&self, runs: &[Recorded]) -> Result<Vec<PathBuf>, RunError> {
         let out = match (&self.out, runs.first()) {
             (Some(out), _) => out.clone(),
-            (None, Some(first)) => first.folder.join("picture"),
+            (None, Some(first)) => first.folder.join(if self.assay { "assay" } else { "picture" }),
             (None, None) => return Err(RunError::Arguments("a figure needs a run".into())),
         };
         match ending(&out).as_deref() {
@@ -115,6 +119,20 @@ impl FigureOfRuns {
             compare_outlines: !several,
             ..SceneFigure::new(title, subtitle, panels)
         })
+    }
+
+    /// The turning assay of one run at one time.
+    fn assay(&self, runs: &[Recorded]) -> Result<Svg, RunError> {
+        let ([run], [] | [_], [] | [_], None) = (runs, &self.times[..], &self.cues[..], self.width) else {
+            let message = "--assay draws one run at one time, by one cue, 180 mm wide";
+            return Err(RunError::Arguments(message.into()));
+        };
+        let time = self.times.first().copied().unwrap_or(run.recording.span().1);
+        // What the panel refuses is refused here too.
+        self.panel(run, String::new(), time)?;
+        let assay = Assay::of(&run.recording, time, self.cues.first().map(String::as_str));
+        let subtitle = format!("{}, {}", run.recording.header.description, time_label(time));
+        plot::draw(&run.recording.header.scene, &subtitle, &assay.plots()).map_err(refused)
     }
 
     fn times_of(&self, run: &Recorded, runs: usize) -> Vec<f64> {

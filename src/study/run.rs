@@ -16,7 +16,7 @@ use crate::record::recorder::{Recorder, RecorderOptions};
 use crate::record::recording::Recording;
 use crate::record::recording::film::FilmTitle;
 use crate::record::scene_figure::FigureError;
-use crate::record::scene_view::scene_figure;
+use crate::record::scene_view::{pooled_figure, scene_figure};
 use crate::record::snapshot::Snapshot;
 use crate::record::summary::{Summary, SummaryOptions};
 use crate::record::svg::Svg;
@@ -360,6 +360,18 @@ pub fn write_figure(folder: &Path, loaded: &Loaded, snapshots: &[Snapshot]) -> R
     }
     let figure = scene_figure(&loaded.scene.name, &loaded.scene.description, snapshots)?;
     write_picture(folder, "figure", &figure)
+}
+
+/// Writes `seeds.svg` and `seeds.png`, the density of the shafts of all runs; nothing if no time was asked for.
+///
+/// # Errors
+/// As [`write_results`].
+pub fn write_pooled_figure(folder: &Path, loaded: &Loaded, runs: &[Finished]) -> Result<(), RunError> {
+    let runs: Vec<&[Snapshot]> = runs.iter().map(|run| run.recorder.snapshots.as_slice()).collect();
+    if runs.first().is_none_or(|first| first.is_empty()) {
+        return Ok(());
+    }
+    write_picture(folder, "seeds", &pooled_figure(&loaded.scene.name, &loaded.scene.description, &runs)?)
 }
 
 /// Writes a drawing as `<name>.svg` and `<name>.png`.

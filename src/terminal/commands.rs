@@ -18,7 +18,7 @@ use crate::study::chart;
 use crate::study::laboratory::Laboratory;
 use crate::study::plan::plan;
 use crate::study::report::Asked;
-use crate::study::run::{RunError, block_schemas, folder_of, write_figure, write_json};
+use crate::study::run::{RunError, block_schemas, folder_of, write_figure, write_json, write_pooled_figure};
 use crate::study::seeds::{SeedsSummary, over_seeds_until, summarise};
 use crate::study::stability::Stability;
 use serde::Serialize;
@@ -204,8 +204,11 @@ pub fn run_seeds(cli: &Cli, roster: &Roster, loaded: &Loaded, folder: &Path, cou
     write_json(&folder.join("summary.json"), &summary)?;
     write_json(&folder.join("manifest.json"), &Manifest::of(loaded))?;
     if let Some(first) = runs.first() {
-        first.recorder.trajectories.write(&folder.join("trajectories.csv"))?;
+        if loaded.scene.output.tables.are_csv() {
+            first.recorder.trajectories.write(&folder.join("trajectories.csv"))?;
+        }
         write_figure(folder, loaded, &first.recorder.snapshots)?;
+        write_pooled_figure(folder, loaded, &runs)?;
     }
     tell!("{}: {} seeds; mean [95 % bootstrap interval]", summary.scene, runs.len());
     for (name, value) in &summary.measures {

@@ -43,7 +43,7 @@ use voice::{alarm, set_voice, unsaid};
 pub fn run(arguments: impl IntoIterator<Item = impl Into<OsString> + Clone>, roster: Roster) -> ExitCode {
     let arguments: Vec<OsString> = arguments.into_iter().map(Into::into).collect();
     let words = words(&arguments);
-    let cli = match Cli::try_parse_from(arguments) {
+    let cli = match Cli::try_parse_from(manners_last(arguments)) {
         Ok(cli) => Cli { words, ..cli },
         Err(error) => {
             // Nothing can be done about a standard output that is gone.
@@ -64,6 +64,16 @@ pub fn run(arguments: impl IntoIterator<Item = impl Into<OsString> + Clone>, ros
         }
         _ => code,
     }
+}
+
+/// The same arguments with those of manners at the end, if they stood before a command: a command takes none before it.
+fn manners_last(mut arguments: Vec<OsString>) -> Vec<OsString> {
+    let is_manner = |word: &&OsString| ["-q", "--quiet", "-v", "--verbose"].iter().any(|manner| *word == manner);
+    let leading = arguments.iter().skip(1).take_while(is_manner).count();
+    if leading > 0 && !arguments.iter().any(|word| word == "--") {
+        arguments[1..].rotate_left(leading);
+    }
+    arguments
 }
 
 fn on_threads<T: Send>(cli: &Cli, work: impl FnOnce() -> Result<T, RunError> + Send) -> Result<T, RunError> {

@@ -25,7 +25,10 @@ pub struct FigureArguments {
     /// Width of the figure, such as 85mm [default: by the number of panels]
     #[arg(long, value_name = "WIDTH", value_parser = width)]
     size: Option<f64>,
-    /// File, ending in .svg or .png; both without an ending [default: RUN/picture]
+    /// Draw a turning assay: paths from one start, first heading upward, and their turning angles
+    #[arg(long)]
+    assay: bool,
+    /// File, ending in .svg or .png; both without an ending [default: RUN/picture, or RUN/assay]
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
 }
@@ -69,6 +72,7 @@ impl FigureArguments {
             times: self.time.clone(),
             cues: self.cue.clone(),
             width: self.size,
+            assay: self.assay,
             out: self.out.clone(),
         }
     }

@@ -130,7 +130,7 @@ fn a_turning_assay_says_the_mean_angle_that_the_summary_says() {
     // The gradient is to the left of all of them, so that toward it is counter-clockwise. Positions are recorded in steps of 5 nm.
     let mean = summary["morphology"]["turning_angle_deg"]["mean"].as_f64().unwrap();
     assert!(mean > 5.0 && drawn.contains(&format!(">{mean:.1} ± ")), "{mean}");
-    assert!(drawn.contains("n = 40)") && folder.0.join("assayed/assay.png").exists());
+    assert!(drawn.contains("n\u{a0}=\u{a0}40)") && folder.0.join("assayed/assay.png").exists());
     for wrong in [&["--time", "0.2,0.4"][..], &["assayed"], &["--size", "85mm"], &["--cue", "none"], &["--time", "9h"]]
     {
         refused(&folder, &[&["figure", "assayed", "--assay"], wrong].concat());

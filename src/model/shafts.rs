@@ -371,10 +371,10 @@ impl Shafts {
 
     /// All material points of a shaft from the origin to the tip; empty before birth.
     pub fn polyline(&self, shaft: usize) -> Vec<MaterialPoint<2>> {
-        let mut points: Vec<_> = self.vertices(shaft).map(|vertex| self.point(vertex)).collect();
-        if !points.is_empty() {
-            points.push(self.tip(shaft as u32));
-        }
+        let stored = self.vertices(shaft).count();
+        let mut points = Vec::with_capacity(stored + usize::from(stored > 0));
+        points.extend(self.vertices(shaft).map(|vertex| self.point(vertex)));
+        points.extend((stored > 0).then(|| self.tip(shaft as u32)));
         points
     }
 }

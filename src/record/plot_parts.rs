@@ -72,7 +72,7 @@ pub(super) fn draw_polylines(svg: &mut Svg, pieces: &[Vec<[f64; 2]>], colour: &s
     }
     let (colour, width) = match stroke {
         Stroke::Underlay => (UNDERLAY, "7"),
-        Stroke::Hair => (colour, "0.4"),
+        Stroke::Hair => (colour, "0.25"),
         _ => (colour, "1.5"),
     };
     let mut style = vec![("d", data.as_str()), ("fill", "none"), ("stroke", colour), ("stroke-width", width)];

@@ -46,8 +46,13 @@ type ConeState = (GrowthCone, Origin, Status, Site, Position, Velocity, SpringSt
 /// Bytes of an axon and its growth cone: their components, and what is kept of the cone during a step.
 pub(super) const BYTES_AN_AXON: usize = size_of::<Axon>() + size_of::<ConeState>() + BYTES_A_STEP;
 
+/// Entities kept free for the resources that come after the cones. A resource is an entity too, and is looked up in a list as long
+/// as the number of that entity: behind the cones it would take eight bytes of each for every resource.
+const ROOM_FOR_RESOURCES: usize = 256;
+
 /// Spawns axons and growth cones, with `spares` more cones for each axon after those of all axons; returns the cones in order.
 pub(super) fn spawn_cones(world: &mut World, scene: &Scene, spares: u32) -> Result<Vec<Entity>, AssemblyError> {
+    let room: Vec<Entity> = (0..ROOM_FOR_RESOURCES).map(|_| world.spawn_empty().id()).collect();
     let mut cones = Vec::new();
     let mut list = Vec::new();
     let mut of_shaft = Vec::new();
@@ -63,17 +68,21 @@ pub(super) fn spawn_cones(world: &mut World, scene: &Scene, spares: u32) -> Resu
             of_shaft.push(index as u16);
         }
     }
-    world.insert_resource(Populations(list));
     let births: Vec<u64> = cones.iter().filter_map(|&cone| world.get::<GrowthCone>(cone)).map(|c| c.birth).collect();
+    let spare_cones = spawn_spares(world, &mut cones, &mut of_shaft, spares);
+    room.into_iter().for_each(|entity| {
+        world.despawn(entity);
+    });
+    world.insert_resource(Populations(list));
     world.insert_resource(BirthQueue::new(births.into_iter()));
-    spawn_spares(world, &mut cones, &mut of_shaft, spares);
+    world.insert_resource(spare_cones);
     world.insert_resource(ShaftPopulations(of_shaft));
     world.insert_resource(Shafts::new(cones.len(), SHAFT_TOLERANCE, LONGEST_SEGMENT));
     Ok(cones)
 }
 
 /// Spawns the cones of branches yet to come: like that of their axon, but born at no time.
-fn spawn_spares(world: &mut World, cones: &mut Vec<Entity>, of_shaft: &mut Vec<u16>, each: u32) {
+fn spawn_spares(world: &mut World, cones: &mut Vec<Entity>, of_shaft: &mut Vec<u16>, each: u32) -> SpareCones {
     let axons = cones.len();
     for axon in 0..axons {
         let Some((&own, &origin)) = world.get::<GrowthCone>(cones[axon]).zip(world.get::<Origin>(cones[axon])) else {
@@ -86,7 +95,7 @@ fn spawn_spares(world: &mut World, cones: &mut Vec<Entity>, of_shaft: &mut Vec<u
             of_shaft.push(own.population);
         }
     }
-    world.insert_resource(SpareCones::new(axons as u32, each));
+    SpareCones::new(axons as u32, each)
 }
 
 /// The instants of all births (ticks), ascending.

@@ -68,24 +68,27 @@ impl Assay {
         let toward = self.gradient.as_ref().map_or("to the right", |_| "toward the gradient");
         match self.mean_angle() {
             Some((mean, Some(error))) => {
-                format!("{mean:.1} ± {error:.1} deg {toward} (mean ± standard error, n = {})", self.angles.len())
+                format!(
+                    "{mean:.1} ± {error:.1} deg {toward} (mean ± standard error, n\u{a0}=\u{a0}{})",
+                    self.angles.len()
+                )
             }
-            Some((mean, None)) => format!("{mean:.1} deg {toward} (n = 1)"),
+            Some((mean, None)) => format!("{mean:.1} deg {toward} (n\u{a0}=\u{a0}1)"),
             None => "no axon has turned yet".to_owned(),
         }
     }
 
     fn path_plot(&self) -> Plot {
-        let extent = self.paths.iter().flatten().map(|x| x[0].abs().max(x[1].abs())).fold(1.0, f64::max) * ROOM;
-        let below = self.paths.iter().flatten().map(|x| -x[1]).fold(0.1 * extent, f64::max);
-        let height = extent + below;
-        let half = (0.5 * ASPECT * height).max(extent);
-        let height = height.max(2.0 * half / ASPECT);
+        let farthest = |of: fn(&[f64; 2]) -> f64| self.paths.iter().flatten().map(of).fold(1.0, f64::max);
+        let [side, above, below] = [farthest(|x| x[0].abs()), farthest(|x| x[1]), farthest(|x| -x[1])];
+        // One scale for both axes.
+        let height = (ROOM * (above + below)).max(2.0 * ROOM * side / ASPECT);
+        let half = 0.5 * ASPECT * height;
         // A point that is no number parts one path from the next.
         let apart = self.paths.iter().flat_map(|path| path.iter().copied().chain([[f64::NAN; 2]]));
         let ray = |degrees: f64| {
             let (sine, cosine) = degrees.to_radians().sin_cos();
-            [[0.0; 2], [0.9 * extent * sine, 0.9 * extent * cosine]]
+            [[0.0; 2], [0.6 * above * sine, 0.6 * above * cosine]]
         };
         let mut series = vec![
             Series::new("axons", apart, Stroke::Hair),
@@ -98,7 +101,10 @@ impl Assay {
         Plot {
             title: "Paths, first heading upward".into(),
             x: Axis { range: Some([-half, half]), ..Axis::linear("to the right (um)") },
-            y: Axis { range: Some([-below, height - below]), ..Axis::linear("along the first heading (um)") },
+            y: Axis {
+                range: Some([-ROOM * below, height - ROOM * below]),
+                ..Axis::linear("along the first heading (um)")
+            },
             series,
             levels: Vec::new(),
             marks: Vec::new(),

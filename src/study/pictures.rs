@@ -131,7 +131,7 @@ impl FigureOfRuns {
         // What the panel refuses is refused here too.
         self.panel(run, String::new(), time)?;
         let assay = Assay::of(&run.recording, time, self.cues.first().map(String::as_str));
-        let subtitle = format!("{}, {}", run.recording.header.description, time_label(time));
+        let subtitle = format!("{}; {}", run.recording.header.description, time_label(time).replace(' ', "\u{a0}"));
         plot::draw(&run.recording.header.scene, &subtitle, &assay.plots()).map_err(refused)
     }
 

@@ -5,26 +5,37 @@
 //! factor, solve and recovered gradient of both cues, and both gradients at 100 000 points; error as root mean square of the
 //! gradient's relative error at the reference's probes (closed form). Matrix: the block of `svk_clamped_stretch.json`: one load step
 //! from rest to 2 % a side, from the tangent at rest by Newton's method to 1e-12, with the rate there.
+//!
+//! At scale (`cargo bench --bench fem -- scale` runs nothing else): a mesh of a million triangles; a cue at a million unknowns, solved for the
+//! first time, and again with everything kept that can be once the domain has been stretched; the whole load path of a block of 1e5
+//! unknowns to 5 % a side, at the options that a scene has by default.
 
 use nalgebra::Vector2;
 use serde_json::Value;
 use std::sync::Arc;
 use std::time::Instant;
 use tropism::numerics::hyperelasticity::{Body, Prescribed};
+use tropism::numerics::load_path::{LoadPath, LoadPathOptions, LoadPathReport};
 use tropism::numerics::locate::{MaterialPoint, SeedGrid};
 use tropism::numerics::material::{Lame, StVenantKirchhoff};
 use tropism::numerics::newton::{NewtonOptions, equilibrium};
 use tropism::numerics::planar_domain::{Outline, PlanarDomain};
 use tropism::numerics::reaction_diffusion::{Mass, ReactionDiffusion, Source, StationarySolver};
 use tropism::numerics::recovery::GradientRecovery;
+use tropism::numerics::simplex_mesh::SimplexMesh;
 use tropism::numerics::triangulate::{MeshOptions, triangulate};
 
 const REPETITIONS: usize = 5;
 const POINTS: usize = 100_000;
+const AT_SCALE: usize = 3;
 
 fn main() {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a thread");
     pool.install(|| {
+        at_scale();
+        if std::env::args().any(|argument| argument == "scale") {
+            return;
+        }
         println!("cue field, 2 cues, gradients at {POINTS} points; median of {REPETITIONS}, one thread");
         println!("{:>9} {:>10} {:>9} {:>11} {:>10}", "h/L", "vertices", "seconds", "gradient %", "heading");
         for size in [0.05, 0.035, 0.025, 0.0177, 0.0145, 0.0125, 0.0088, 0.00625, 0.0044] {
@@ -36,6 +47,64 @@ fn main() {
             matrix(size);
         }
     });
+}
+
+/// Median seconds of a piece of work, and what it gave the last time.
+fn timed<T>(repetitions: usize, mut work: impl FnMut() -> T) -> (f64, T) {
+    let mut run = || {
+        let start = Instant::now();
+        let found = work();
+        (start.elapsed().as_secs_f64(), found)
+    };
+    let (first, mut last) = run();
+    let mut seconds = vec![first];
+    for _ in 1..repetitions {
+        let (again, found) = run();
+        seconds.push(again);
+        last = found;
+    }
+    (median(seconds), last)
+}
+
+fn at_scale() {
+    println!("at scale; median of {AT_SCALE}, one thread");
+    let rectangle = PlanarDomain::rectangle(1.5, 1.0);
+    let meshed = |size: f64| triangulate(&rectangle, &[], &MeshOptions::of_size(size)).expect("a mesh");
+    let (seconds, fitted) = timed(AT_SCALE, || meshed(0.001_86));
+    println!("mesh of {} triangles: {seconds:.2} s", fitted.mesh.cell_count());
+    let disc = Outline::disc([0.75, 0.85], 0.08, 0.001_32);
+    let fitted = triangulate(&rectangle, &[disc], &MeshOptions::of_size(0.001_32)).expect("a mesh");
+    let (mesh, x) = (&fitted.mesh, fitted.mesh.vertices());
+    let law = ReactionDiffusion { diffusion: 1.0, degradation: 100.0, mass: Mass::Lumped };
+    let sources = [Source::new(&fitted.regions[0], 100.0)];
+    let (seconds, mut solver) = timed(AT_SCALE, || {
+        let mut solver = StationarySolver::new(mesh, &fitted.regions).expect("a solver");
+        std::hint::black_box(solver.solve(&law, x, &sources).expect("a field"));
+        solver
+    });
+    println!("cue at {} unknowns, first solve: {seconds:.2} s", mesh.vertex_count());
+    let moved: Vec<[f64; 2]> = x.iter().map(|x| [x[0] * (1.0 - 0.02 * x[1]), 1.05 * x[1]]).collect();
+    let (seconds, _) = timed(AT_SCALE, || solver.solve(&law, &moved, &sources).expect("a field"));
+    println!("the same once the domain has been stretched by 5 %: {seconds:.2} s");
+    let fitted = meshed(0.005_85);
+    let body = block(&fitted.mesh, 0.05);
+    let (seconds, path) = timed(AT_SCALE, || LoadPath::solve(&body, &LoadPathOptions::default()).expect("a path"));
+    let LoadPathReport { solves, newton_iterations, defect, .. } = path.report();
+    println!(
+        "load path at {} unknowns: {seconds:.2} s ({solves} solves, {newton_iterations} Newton iterations, defect {defect:.1e})",
+        body.unknowns()
+    );
+}
+
+/// The clamped block, whose long sides are drawn apart by a share of its height each.
+fn block(mesh: &SimplexMesh<2>, share: f64) -> Body<'_, 2> {
+    let lame = Lame::from_young_poisson(1.0, 0.3).expect("a material");
+    let mut prescribed = Prescribed::none(mesh.vertex_count());
+    for (vertex, x) in mesh.vertices().iter().enumerate().filter(|(_, x)| x[1] == 0.0 || x[1] == 1.0) {
+        prescribed.impose(vertex, 0, 0.0);
+        prescribed.impose(vertex, 1, if x[1] == 0.0 { -share } else { share });
+    }
+    Body::new(mesh, Arc::new(StVenantKirchhoff { lame }), prescribed).expect("a body")
 }
 
 /// Evenly spread points inside the rectangle.
@@ -103,15 +172,9 @@ fn probe_errors(gradient: impl Fn([f64; 2], usize) -> Option<Vector2<f64>>) -> (
 fn matrix(size: f64) {
     let fitted = triangulate(&PlanarDomain::rectangle(1.5, 1.0), &[], &MeshOptions::of_size(size)).expect("a mesh");
     let mesh = &fitted.mesh;
-    let lame = Lame::from_young_poisson(1.0, 0.3).expect("a material");
     let (mut seconds, mut iterations, mut unknowns) = (Vec::new(), 0, 0);
     for _ in 0..REPETITIONS {
-        let mut prescribed = Prescribed::none(mesh.vertex_count());
-        for (vertex, x) in mesh.vertices().iter().enumerate().filter(|(_, x)| x[1] == 0.0 || x[1] == 1.0) {
-            prescribed.impose(vertex, 0, 0.0);
-            prescribed.impose(vertex, 1, if x[1] == 0.0 { -0.2 } else { 0.2 });
-        }
-        let body = Body::new(mesh, Arc::new(StVenantKirchhoff { lame }), prescribed).expect("a body");
+        let body = block(mesh, 0.2);
         let rest = vec![0.0; 2 * mesh.vertex_count()];
         let start_of_path = equilibrium(&body, 0.0, &rest, &NewtonOptions::default()).expect("rest");
         let start = Instant::now();

@@ -228,3 +228,14 @@ pub fn memory_mib(name: &str) -> Option<f64> {
     let kib: f64 = line.split_whitespace().nth(1)?.parse().ok()?;
     Some(kib / 1024.0)
 }
+
+/// Seconds of processor time that the threads of this process have used, those that have ended left out; none where the system does
+/// not tell.
+pub fn cpu_seconds() -> Option<f64> {
+    let threads = std::fs::read_dir("/proc/self/task").ok()?;
+    let nanoseconds = |thread: std::fs::DirEntry| -> Option<f64> {
+        let line = std::fs::read_to_string(thread.path().join("schedstat")).ok()?;
+        line.split(' ').next()?.parse().ok()
+    };
+    Some(1e-9 * threads.filter_map(|thread| nanoseconds(thread.ok()?)).sum::<f64>())
+}

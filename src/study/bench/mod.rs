@@ -12,10 +12,10 @@ use super::run::RunError;
 use crate::model::clock::Clock;
 use crate::model::health::Counters;
 use crate::model::shafts::Shafts;
-use crate::model::stopwatch::Stopwatch;
+use crate::model::stopwatch::{Elapsed, Stopwatch};
 use crate::model::tissue::Configuration;
 use crate::model::violation::pointer_token;
-use crate::record::summary::memory_mib;
+use crate::record::summary::{cpu_seconds, memory_mib};
 use crate::scenario::load::Loaded;
 use crate::simulation::Simulation;
 use plain::PlainLoop;
@@ -44,13 +44,16 @@ pub struct Row {
     pub cone_steps: u64,
     /// Hours that cones grew, all together.
     pub cone_hours: f64,
-    /// Seconds that cones took.
+    /// Seconds on the wall that cones took.
     pub seconds: Seconds,
+    /// Seconds of processor time that they took, median: those on the wall times the share of the run in which threads were at work;
+    /// none where the system does not tell.
+    pub cpu_seconds: Option<f64>,
     /// Seconds of mesh, tissue and fields.
     pub scenery_seconds: f64,
     /// Seconds of the plain loop.
     pub plain_seconds: Option<Seconds>,
-    /// Seconds of cones over those of the plain loop, both medians.
+    /// Seconds of processor time of cones over those of the plain loop, both medians; on the wall where the system does not tell.
     pub ratio: Option<f64>,
     /// Largest distance between the ends of the same cone in both (µm).
     pub difference: Option<f64>,
@@ -58,7 +61,11 @@ pub struct Row {
     pub cone_steps_a_second: f64,
     /// Cone-hours a second.
     pub cone_hours_a_second: f64,
-    /// The same, tissue and fields included.
+    /// Steps of growing cones a second of processor time.
+    pub cone_steps_a_cpu_second: Option<f64>,
+    /// Cone-hours a second of processor time.
+    pub cone_hours_a_cpu_second: Option<f64>,
+    /// Cone-hours a second, tissue and fields included.
     pub cone_hours_a_second_with_scenery: f64,
     /// Power with which the cones' time grows with the cone-steps of one run.
     pub growth_in_steps: f64,
@@ -91,6 +98,30 @@ struct Timed {
     phases: BTreeMap<&'static str, f64>,
     marks: Vec<[f64; 2]>,
     bytes: Option<f64>,
+    /// Threads at work, on average.
+    busy: Option<f64>,
+}
+
+/// What one run of the plain loop gave.
+struct TimedPlain {
+    seconds: f64,
+    busy: Option<f64>,
+    /// Largest distance of its cones from those of the simulation (µm).
+    apart: f64,
+}
+
+/// Processor time and time on the wall since a moment, one over the other.
+struct Busy(Option<f64>, Elapsed);
+
+impl Busy {
+    fn begin() -> Self {
+        Self(cpu_seconds(), Elapsed::default())
+    }
+
+    /// How many threads have been at work, on average; none where the system does not tell.
+    fn threads(&self) -> Option<f64> {
+        Some((cpu_seconds()? - self.0?) / self.1.seconds().max(f64::MIN_POSITIVE))
+    }
 }
 
 /// Times a scene at several numbers of axons, ascending.
@@ -119,22 +150,44 @@ pub fn bench(laboratory: &Laboratory, axons: &[u64], tick: &dyn Fn(f64)) -> Resu
     })
 }
 
+/// The seconds of several runs of the same.
+#[derive(Default)]
+struct Timings {
+    wall: Vec<f64>,
+    cpu: Vec<f64>,
+}
+
+impl Timings {
+    fn push(&mut self, seconds: f64, busy: Option<f64>) {
+        self.wall.push(seconds);
+        self.cpu.extend(busy.map(|threads| seconds * threads));
+    }
+
+    fn wall(&self) -> Option<Seconds> {
+        Seconds::of(&self.wall)
+    }
+
+    fn cpu(&self) -> Option<f64> {
+        Seconds::of(&self.cpu).map(|seconds| seconds.median)
+    }
+}
+
 fn row(laboratory: &Laboratory, axons: u64, without_plain: &mut Option<String>) -> Result<Row, RunError> {
     let loaded = laboratory.load(&[], &[format!("{KEY}={axons}")])?;
     let repetitions = if axons > MOST_REPEATED { 1 } else { laboratory.repetitions };
-    let (mut own, mut plain, mut difference) = (Vec::new(), Vec::new(), None);
+    let (mut own, mut plain, mut difference) = (Timings::default(), Timings::default(), None);
     let (mut last, mut bytes) = (None, None);
     for _ in 0..repetitions {
         drop(last.take());
         let timed = run(laboratory, &loaded)?;
-        own.push(cone_seconds(&timed.phases));
+        own.push(cone_seconds(&timed.phases), timed.busy);
         // What one run has given back, the next takes again: the first tells.
         bytes = bytes.or(timed.bytes);
         if axons <= MOST_PLAIN {
             match run_plain(laboratory, (axons, &loaded), &timed.simulation)? {
-                Ok((seconds, apart)) => {
-                    plain.push(seconds);
-                    difference = Some(apart);
+                Ok(timed) => {
+                    plain.push(timed.seconds, timed.busy);
+                    difference = Some(timed.apart);
                 }
                 Err(reason) => *without_plain = Some(reason),
             }
@@ -142,8 +195,12 @@ fn row(laboratory: &Laboratory, axons: u64, without_plain: &mut Option<String>) 
         last = Some(timed);
     }
     let timed = last.ok_or_else(|| RunError::Internal("nothing was timed".into()))?;
-    let seconds = Seconds::of(&own).ok_or_else(|| RunError::Internal("nothing was timed".into()))?;
-    let plain_seconds = Seconds::of(&plain);
+    let seconds = own.wall().ok_or_else(|| RunError::Internal("nothing was timed".into()))?;
+    let (plain_seconds, cpu_seconds) = (plain.wall(), own.cpu());
+    let ratio = match cpu_seconds.zip(plain.cpu()) {
+        Some((own, plain)) => Some(own / plain),
+        None => plain_seconds.map(|plain| seconds.median / plain.median),
+    };
     let Timed { simulation, phases, marks, .. } = timed;
     let world = simulation.world();
     let Counters { cone_steps, .. } = simulation.counters();
@@ -156,12 +213,15 @@ fn row(laboratory: &Laboratory, axons: u64, without_plain: &mut Option<String>) 
         cone_steps,
         cone_hours,
         seconds,
+        cpu_seconds,
         scenery_seconds,
         plain_seconds,
-        ratio: plain_seconds.map(|plain| seconds.median / plain.median),
+        ratio,
         difference,
         cone_steps_a_second: cone_steps as f64 / seconds.median,
         cone_hours_a_second: cone_hours / seconds.median,
+        cone_steps_a_cpu_second: cpu_seconds.map(|seconds| cone_steps as f64 / seconds),
+        cone_hours_a_cpu_second: cpu_seconds.map(|seconds| cone_hours / seconds),
         cone_hours_a_second_with_scenery: cone_hours / (seconds.median + scenery_seconds),
         growth_in_steps: fitted_power(&marks).unwrap_or(f64::NAN),
         bytes_an_axon: bytes.map(|bytes| bytes / axons as f64),
@@ -177,6 +237,7 @@ fn cone_seconds(phases: &BTreeMap<&'static str, f64>) -> f64 {
 /// Assembles a scene and runs it to its end.
 fn run(laboratory: &Laboratory, loaded: &Loaded) -> Result<Timed, RunError> {
     let before = memory_mib("VmRSS:");
+    let busy = Busy::begin();
     let mut simulation = laboratory.assemble(loaded)?;
     let end = simulation.world().resource::<Clock>().end;
     let mut marks = Vec::new();
@@ -192,15 +253,15 @@ fn run(laboratory: &Laboratory, loaded: &Loaded) -> Result<Timed, RunError> {
     simulation.lap("record");
     let bytes = memory_mib("VmRSS:").zip(before).map(|(after, before)| (after - before) * MIB);
     let phases = simulation.world().resource::<Stopwatch>().seconds().clone();
-    Ok(Timed { simulation, phases, marks, bytes })
+    Ok(Timed { simulation, phases, marks, bytes, busy: busy.threads() })
 }
 
-/// Seconds of the plain loop and the largest distance of its cones from those of a simulation (µm), or why it cannot run.
+/// Runs the plain loop beside a simulation that is over, or says why it cannot.
 fn run_plain(
     laboratory: &Laboratory,
     (axons, loaded): (u64, &Loaded),
     simulation: &Simulation,
-) -> Result<Result<(f64, f64), String>, RunError> {
+) -> Result<Result<TimedPlain, String>, RunError> {
     let duration = loaded.scene.time.duration.0;
     let late =
         |name: &String| format!("/populations{}/births={{\"at\": {}}}", pointer_token(name), duration * (1.0 - 1e-9));
@@ -211,12 +272,14 @@ fn run_plain(
         Ok(plain) => plain,
         Err(reason) => return Ok(Err(reason)),
     };
+    let busy = Busy::begin();
     plain.run(&mut stage);
+    let busy = busy.threads();
     stage.look_at(simulation.time());
     let (mesh, now) = (&plain.tissue().mesh, stage.world().resource::<Configuration>());
     let ends = plain.sites().map(|site| now.position(mesh, site));
     let apart = cones(simulation).iter().zip(ends).map(|(cone, end)| (cone.position - end).norm()).fold(0.0, f64::max);
-    Ok(Ok((plain.seconds(), apart)))
+    Ok(Ok(TimedPlain { seconds: plain.seconds(), busy, apart }))
 }
 
 /// The power p of y ~ x^p through some points.

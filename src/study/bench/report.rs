@@ -20,14 +20,14 @@ pub fn write(folder: &Path, bench: &Bench) -> Result<(), RunError> {
 
 fn table(bench: &Bench) -> String {
     let mut text = "axons,cone_steps,cone_hours,seconds,plain_seconds,ratio,difference_um,scenery_seconds,\
-                    cone_steps_a_second,cone_hours_a_second,bytes_an_axon\n"
+                    cone_steps_a_second,cone_hours_a_second,cpu_seconds,cone_steps_a_cpu_second,cone_hours_a_cpu_second,bytes_an_axon\n"
         .to_owned();
     let word = |value: Option<f64>| value.map_or(String::new(), |value| format!("{value:e}"));
     for row in &bench.rows {
         // Writing to a string cannot fail.
         let _ = writeln!(
             text,
-            "{},{},{:e},{:e},{},{},{},{:e},{:e},{:e},{}",
+            "{},{},{:e},{:e},{},{},{},{:e},{:e},{:e},{},{},{},{}",
             row.axons,
             row.cone_steps,
             row.cone_hours,
@@ -38,6 +38,9 @@ fn table(bench: &Bench) -> String {
             row.scenery_seconds,
             row.cone_steps_a_second,
             row.cone_hours_a_second,
+            word(row.cpu_seconds),
+            word(row.cone_steps_a_cpu_second),
+            word(row.cone_hours_a_cpu_second),
             word(row.bytes_an_axon),
         );
     }
@@ -83,14 +86,25 @@ impl Display for Bench {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(
             formatter,
-            "{:>10} {:>12} {:>9} {:>9} {:>6} {:>12} {:>12} {:>9} {:>9}",
-            "axons", "cone-steps", "seconds", "plain s", "ratio", "steps/s", "cone-h/s", "scenery s", "B/axon"
+            "{:>10} {:>12} {:>9} {:>9} {:>6} {:>10} {:>10} {:>9} {:>11} {:>10} {:>9} {:>7}",
+            "axons",
+            "cone-steps",
+            "wall s",
+            "plain s",
+            "ratio",
+            "steps/s",
+            "cone-h/s",
+            "CPU s",
+            "steps/CPU s",
+            "h/CPU s",
+            "scenery s",
+            "B/axon"
         )?;
         let word = |value: Option<f64>, digits: usize| value.map_or("-".into(), |value| format!("{value:.digits$}"));
         for row in &self.rows {
             writeln!(
                 formatter,
-                "{:>10} {:>12} {:>9.3} {:>9} {:>6} {:>12.0} {:>12.0} {:>9.3} {:>9}",
+                "{:>10} {:>12} {:>9.3} {:>9} {:>6} {:>10.0} {:>10.0} {:>9} {:>11} {:>10} {:>9.3} {:>7}",
                 row.axons,
                 row.cone_steps,
                 row.seconds.median,
@@ -98,6 +112,9 @@ impl Display for Bench {
                 word(row.ratio, 2),
                 row.cone_steps_a_second,
                 row.cone_hours_a_second,
+                word(row.cpu_seconds, 3),
+                word(row.cone_steps_a_cpu_second, 0),
+                word(row.cone_hours_a_cpu_second, 0),
                 row.scenery_seconds,
                 word(row.bytes_an_axon, 0),
             )?;

@@ -108,6 +108,11 @@ export class Pane {
         this.painted?.prepare(this.paint);
     }
 
+    /** Vertices of shafts that the last drawing took. */
+    get vertices(): number {
+        return this.painted?.vertices ?? this.shafts.vertices;
+    }
+
     /** Whether an axon's population is shown. */
     isShown = (axon: number): boolean => !this.look?.hidden.has(this.recording.population[axon]);
 
@@ -153,7 +158,7 @@ export class Pane {
         const view = [camera.x, camera.y, camera.scale, size.width, size.height, level].join(" ");
         if (!this.painted || !this.paint || view === this.paintedView) return;
         this.paintedView = view;
-        this.painted.paint(this.paint, this.moment, this.tissue.vertices.image.data as Float32Array, this.look?.layers.targets ? this.targetLines() : [], { camera, size }, level > 0 ? 2 : 1);
+        this.painted.paint(this.paint, this.moment, this.tissue.vertices.image.data as Float32Array, this.look?.layers.targets ? this.targetLines() : [], { camera, size }, level);
     }
 
     private meshLine(line: number[]): number[] {

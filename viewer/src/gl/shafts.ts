@@ -158,6 +158,11 @@ export class ShaftLayer {
         this.drawing["byDirection"].value = byDirection;
     }
 
+    /** Vertices that are drawn. */
+    get vertices(): number {
+        return this.mesh.visible ? this.mesh.geometry.drawRange.count / 6 : 0;
+    }
+
     /** Writes the pieces of a moment at a level of detail (0: every vertex). */
     update(renderer: three.WebGLRenderer, moment: Moment, level: number, camera: three.Camera): void {
         const { order, times } = this.levels[level];

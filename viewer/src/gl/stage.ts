@@ -4,6 +4,8 @@ import type { Camera, Size } from "../numbers/camera.ts";
 import type { Rgb } from "../numbers/colours.ts";
 import { LEVELS } from "./shafts.ts";
 import type { Recording } from "../data/recording.ts";
+import { PAINTED_LEVELS } from "../soft/painter.ts";
+import { Pace } from "../numbers/pace.ts";
 import { type Look, Pane } from "./pane.ts";
 
 /** A pane and the element whose place it fills. */
@@ -12,11 +14,8 @@ export interface Place {
     element: HTMLElement;
 }
 
-/** Milliseconds a frame above which less detail is drawn while things move, and below which more. */
-const SLOW = 40;
-const FAST = 22;
-/** Milliseconds that a picture at rest may take. */
-const PATIENCE = 800;
+/** Milliseconds after the last movement at which all is drawn. */
+const STILL = 350;
 
 /** The axon that stands out: index of its place, and its own. */
 export interface Chosen {
@@ -34,15 +33,15 @@ export class Stage {
     private readonly renderer: three.WebGLRenderer;
     private readonly eye = new three.Camera();
     private requested = false;
-    private level = 0;
-    private moved = 0;
-    private calm = 0;
+    private readonly pace: Pace;
+    /** What the last drawing showed; level 0 is everything. */
+    private shown: { time: number; camera: Camera; level: number } | null = null;
     private rest: ReturnType<typeof setTimeout> | undefined;
     private background: string = "#ffffff";
 
     readonly places: Place[];
     /** Whether WebGL runs on the processor, which then paints by itself what is many. */
-    private readonly soft: boolean;
+    readonly soft: boolean;
 
     constructor(private readonly canvas: HTMLCanvasElement, panes: { recording: Recording; element: HTMLElement }[], linkage: number) {
         this.renderer = new three.WebGLRenderer({ canvas, antialias: false, alpha: false, depth: false, preserveDrawingBuffer: true });
@@ -50,6 +49,7 @@ export class Stage {
         this.renderer.autoClear = false;
         this.renderer.setScissorTest(true);
         this.soft = isSoftware(this.renderer.getContext() as WebGL2RenderingContext);
+        this.pace = this.soft ? new Pace(1, PAINTED_LEVELS - 1) : new Pace(0, LEVELS - 1);
         canvas.dataset["drawing"] = this.soft ? "processor" : "graphics";
         this.places = panes.map(({ recording, element }) => ({ element, pane: new Pane(recording, linkage, this.soft) }));
         canvas.addEventListener("webglcontextrestored", () => this.change());
@@ -75,39 +75,27 @@ export class Stage {
         return { width, height };
     }
 
-    /** Asks for a drawing. */
+    /** Asks for a drawing: with less detail, if need be, where time or view have moved since the last one; all of it soon after. */
     change(): void {
         if (this.requested) return;
         this.requested = true;
         requestAnimationFrame((now) => {
             this.requested = false;
-            this.govern(now);
-            this.draw(this.level);
+            const level = this.shown === null ? 0 : this.isMoved(this.shown) ? this.pace.levelAt(now) : this.shown.level;
+            this.draw(level);
             clearTimeout(this.rest);
-            if (this.level > 0) this.rest = setTimeout(() => this.settle(), 350);
+            this.rest = setTimeout(() => this.settle(), STILL);
         });
     }
 
-    /** Less detail where frames come slowly, more where they come fast again. */
-    private govern(now: number): void {
-        const interval = now - this.moved;
-        this.moved = now;
-        if (interval > 1000) return;
-        this.calm = interval < FAST ? this.calm + 1 : interval > SLOW ? Math.min(this.calm, 0) - 1 : 0;
-        if (this.calm <= -3 && this.level < (this.soft ? 1 : LEVELS - 1)) [this.level, this.calm] = [this.level + 1, 0];
-        if (this.calm >= 40 && this.level > 0) [this.level, this.calm] = [this.level - 1, 0];
+    private settle(): void {
+        this.pace.rest();
+        if (this.shown?.level !== 0) this.draw(0);
     }
 
-    /** At rest: as much detail as patience allows. */
-    private settle(): void {
-        const start = performance.now();
-        let level = this.level;
-        while (level > 0 && performance.now() - start < PATIENCE / 4) {
-            level--;
-            this.draw(level);
-            this.renderer.getContext().finish();
-        }
-        this.moved = 0;
+    private isMoved({ time, camera: { x, y, scale } }: { time: number; camera: Camera }): boolean {
+        const { camera } = this;
+        return time !== this.time || x !== camera.x || y !== camera.y || scale !== camera.scale;
     }
 
     private draw(level: number): void {
@@ -127,6 +115,8 @@ export class Stage {
             renderer.clear();
             pane.draw(renderer, this.time, this.camera, place, level, chosen, this.eye);
         });
+        this.shown = { time: this.time, camera: this.camera, level };
+        this.canvas.dataset["vertices"] = String(this.places.reduce((sum, { pane }) => sum + pane.vertices, 0));
         this.afterDraw();
     }
 }

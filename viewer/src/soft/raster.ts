@@ -8,6 +8,9 @@ export function packed(red: number, green: number, blue: number): number {
 /** A picture of opaque pixels, upper left first. */
 export class Raster {
     readonly pixels: Int32Array;
+    /** What {@link cut} found: the first pixel, and the one beyond the last. */
+    from = 0;
+    to = 0;
 
     constructor(readonly width: number, readonly height: number, buffer: ArrayBuffer) {
         this.pixels = new Int32Array(buffer, 0, width * height);
@@ -56,26 +59,26 @@ export class Raster {
         }
     }
 
-    /** Calls back with each row of pixels whose centres lie in a triangle: y, first x, x beyond the last. */
-    triangle(xs: ArrayLike<number>, ys: ArrayLike<number>, row: (y: number, from: number, to: number) => void): void {
-        const top = Math.max(Math.ceil(Math.min(ys[0], ys[1], ys[2]) - 0.5), 0);
-        const bottom = Math.min(Math.ceil(Math.max(ys[0], ys[1], ys[2]) - 0.5), this.height);
-        for (let y = top; y < bottom; y++) {
-            let left = Infinity;
-            let right = -Infinity;
-            for (let side = 0; side < 3; side++) {
-                const next = side === 2 ? 0 : side + 1;
-                const from = ys[side] - y - 0.5;
-                const to = ys[next] - y - 0.5;
-                if (from <= 0 === to <= 0) continue;
-                const x = xs[side] + ((xs[next] - xs[side]) * from) / (from - to);
-                if (x < left) left = x;
-                if (x > right) right = x;
-            }
-            const first = Math.max(Math.ceil(left - 0.5), 0);
-            const beyond = Math.min(Math.ceil(right - 0.5), this.width);
-            if (first < beyond) row(y, first, beyond);
+    /** The number of rows whose centres lie above a height, of those that exist. */
+    rowsBelow(y: number): number {
+        return Math.min(Math.max(Math.ceil(y - 0.5), 0), this.height);
+    }
+
+    /** Sets `from` and `to` to the pixels of a row whose centres lie in a triangle. */
+    cut(xs: Float64Array, ys: Float64Array, row: number): void {
+        let left = Infinity;
+        let right = -Infinity;
+        for (let side = 0; side < 3; side++) {
+            const next = side === 2 ? 0 : side + 1;
+            const above = ys[side] - row - 0.5;
+            const below = ys[next] - row - 0.5;
+            if (above <= 0 === below <= 0) continue;
+            const x = xs[side] + ((xs[next] - xs[side]) * above) / (above - below);
+            if (x < left) left = x;
+            if (x > right) right = x;
         }
+        this.from = Math.max(Math.ceil(left - 0.5), 0);
+        this.to = Math.min(Math.ceil(right - 0.5), this.width);
     }
 }
 

@@ -26,7 +26,7 @@ export interface Run {
 const LINKAGE = 10;
 /** Pixels around a pointer within which an axon is found. */
 const REACH = 12;
-/** Milliseconds between two updates of the measures while time runs: drawing them anew costs more than the scene. */
+/** Milliseconds between two updates of texts and figures while time runs: drawing them anew costs more than the scene. */
 const TELLING = 150;
 
 /** Stage and controls of runs. */
@@ -44,8 +44,9 @@ export class Runs {
     private followed: Chosen | null = null;
     private hovered: Chosen | null = null;
     private pointer: [number, number] | null = null;
-    /** When the figures of the measures were last brought up to date. */
+    /** When the figures of the measures were last brought up to date, and whether they are with the present frame. */
     private told = 0;
+    private telling = true;
     /** µm a pixel at which everything is seen. */
     private fitted = 1;
 
@@ -59,7 +60,7 @@ export class Runs {
             return { recording, element };
         });
         this.stage = new Stage(canvas, places, this.linkage);
-        this.transport = new Transport(longest(recordings).frames, (time) => this.moveTo(time));
+        this.transport = new Transport(longest(recordings).frames, this.stage.soft ? TELLING : 0, (time) => this.moveTo(time));
         this.figures = new MeasureFigures(runs.map(({ label, recording }) => ({ label, columns: measuresOf(recording) })), (time) => this.transport.jump(time));
         this.card = new Card(() => this.follow(null));
         this.surface = h("div", {
@@ -107,7 +108,8 @@ export class Runs {
     private moveTo(time: number): void {
         this.stage.time = time;
         const now = performance.now();
-        if (!this.transport.playing || now - this.told > TELLING) {
+        this.telling = !this.transport.playing || now - this.told > TELLING;
+        if (this.telling) {
             this.figures.show(time);
             this.told = now;
         }
@@ -177,7 +179,7 @@ export class Runs {
             this.stage.change();
         }
         const told = this.hovered ?? this.followed;
-        this.card.show(told ? axonNumbers(this.stage.places[told.place].pane.moment, told.axon) : null, isSame(told, this.followed));
+        if (this.telling || told === null) this.card.show(told ? axonNumbers(this.stage.places[told.place].pane.moment, told.axon) : null, isSame(told, this.followed));
         this.surface.classList.toggle("found", this.hovered !== null);
         if (this.followed && this.transport.playing) this.keepInView(this.followed);
     }
@@ -198,8 +200,10 @@ export class Runs {
         const { scale } = this.stage.camera;
         const length = roundDown(Math.min(120, this.stage.sizeOf(0).width * 0.3) * scale);
         const [text, line] = [this.scaleBar.firstElementChild as HTMLElement, this.scaleBar.lastElementChild as HTMLElement];
-        text.textContent = `${written(length)} µm`;
-        line.style.width = `${length / scale}px`;
+        const words = `${written(length)} µm`;
+        if (text.textContent !== words) text.textContent = words;
+        const width = `${length / scale}px`;
+        if (line.style.width !== width) line.style.width = width;
     }
 
     private zoomButtons(): HTMLElement {

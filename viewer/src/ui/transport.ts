@@ -13,10 +13,13 @@ export class Transport {
     private readonly clock = h("output", { class: "clock", for: "time" });
     private speed = 1;
     private last = 0;
+    /** When slider and clock were last brought up to date. */
+    private told = 0;
     playing = false;
     time: number;
 
-    constructor(private readonly frames: number[], private readonly changed: (time: number) => void) {
+    /** While time runs, slider and clock follow every `telling` milliseconds. */
+    constructor(private readonly frames: number[], private readonly telling: number, private readonly changed: (time: number) => void) {
         const [first, end] = [frames[0], frames[frames.length - 1]];
         this.time = end;
         this.slider = h("input", {
@@ -37,7 +40,11 @@ export class Transport {
     /** Goes to a time in hours. */
     goTo(time: number): void {
         this.time = Math.min(Math.max(time, this.frames[0]), this.frames[this.frames.length - 1]);
-        this.show();
+        const now = performance.now();
+        if (!this.playing || now - this.told >= this.telling) {
+            this.told = now;
+            this.show();
+        }
         this.changed(this.time);
     }
 

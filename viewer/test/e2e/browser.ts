@@ -48,6 +48,15 @@ export function drawn(page: Page): Promise<void> {
     return page.evaluate(() => new Promise<void>((done) => requestAnimationFrame(() => requestAnimationFrame(() => done()))));
 }
 
+/** Moves the slider to a time. */
+export async function setTime(page: Page, hours: number): Promise<void> {
+    await page.locator("#time").evaluate((slider: HTMLInputElement, time) => {
+        slider.value = String(time);
+        slider.dispatchEvent(new Event("input"));
+    }, hours);
+    await drawn(page);
+}
+
 /** What the canvas shows. */
 export async function picture(page: Page): Promise<PNG> {
     await drawn(page);

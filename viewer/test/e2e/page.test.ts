@@ -9,7 +9,7 @@ import { readRecording } from "../../src/data/recording.ts";
 import { fitting, pixelOf } from "../../src/numbers/camera.ts";
 import { Moment } from "../../src/numbers/moment.ts";
 import { HERE, page as report, SAMPLE_CHART, SAMPLE_REPORT, smallSample, writePage } from "../pages.ts";
-import { difference, drawn, launch, open, picture, thumbnail } from "./browser.ts";
+import { difference, drawn, launch, open, picture, setTime, thumbnail } from "./browser.ts";
 
 let browser: Browser;
 const bytes = smallSample();
@@ -17,14 +17,6 @@ const url = writePage("small.html", report(SAMPLE_REPORT, [{ label: "", bytes }]
 
 before(async () => { browser = await launch(); });
 after(async () => { await browser.close(); });
-
-async function setTime(page: Page, hours: number): Promise<void> {
-    await page.locator("#time").evaluate((slider: HTMLInputElement, time) => {
-        slider.value = String(time);
-        slider.dispatchEvent(new Event("input"));
-    }, hours);
-    await drawn(page);
-}
 
 /** The pixel of a cone of the sample on the page, at a time, with everything in view. */
 async function coneOnPage(page: Page, axon: number, hours: number): Promise<[number, number]> {

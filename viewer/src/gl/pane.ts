@@ -7,7 +7,7 @@ import type { Camera, Size } from "../numbers/camera.ts";
 import { cyclic, type Rgb } from "../numbers/colours.ts";
 import { Moment } from "../numbers/moment.ts";
 import { outlineOf } from "../numbers/outline.ts";
-import { ConeLayer } from "./cones.ts";
+import { coneSize, ConeLayer } from "./cones.ts";
 import { Ribbons } from "./ribbons.ts";
 import { ShaftLayer } from "./shafts.ts";
 import { byteTexture, floatTexture, type ViewUniforms } from "./textures.ts";
@@ -80,12 +80,11 @@ export class Pane {
         const count = this.recording.axonCount;
         const byHue = look.colour === "heading";
         const opacity = (look.colour === "ink" ? 0.42 : 0.6) * (count > 3000 ? 0.6 : 1);
-        const size = count > 3000 ? 4.4 : count > 800 ? 6.5 : 8;
         const rim: Rgb = dark ? [0x14, 0x13, 0x17] : [255, 255, 255];
         const outline: Rgb = dark ? [0xa8, 0xa3, 0x9c] : [0x6b, 0x66, 0x60];
         this.tissue.choose(look.cues, dark);
         this.shafts.style(count > 3000 ? 1 : 1.3, opacity, byHue);
-        this.cones.style(size, density, look.colour === "ink", rim);
+        this.cones.style(density, look.colour === "ink", rim);
         this.ribbons.outline.style(1.3, outline, 1);
         this.ribbons.start.style(1.2, outline, 0.75, [2, 3]);
         this.ribbons.targetHalo.style(3.6, rim, 0.85);
@@ -104,7 +103,7 @@ export class Pane {
         this.written.time = Number.NaN;
         const { tissue, shafts, cones } = layers;
         const hues = byHue ? (this.hues.image.data as Uint8Array) : null;
-        this.paint = { background, dark, cues: look.cues, tissue, shafts, cones, opacity, size, colours: this.colours.image.data as Uint8Array, hues, byStatus: look.colour === "ink", rim, ink: ink(dark) };
+        this.paint = { background, dark, cues: look.cues, tissue, shafts, cones, opacity, colours: this.colours.image.data as Uint8Array, hues, byStatus: look.colour === "ink", rim, ink: ink(dark) };
         this.painted?.prepare(this.paint);
     }
 
@@ -133,6 +132,7 @@ export class Pane {
             this.written = { time, level };
             this.paintedView = "";
         }
+        this.cones.resize(coneSize(this.recording, camera));
         this.repaint(camera, size, level);
         const shaft = chosen === null ? [] : [this.moment.shaft(chosen)];
         this.ribbons.halo.draw(shaft);

@@ -4,7 +4,7 @@
  */
 import * as three from "three";
 import type { Recording } from "../data/recording.ts";
-import { SHAPES, statusLook, type Shape } from "../gl/cones.ts";
+import { coneSize, SHAPES, statusLook, type Shape } from "../gl/cones.ts";
 import { pulled, rawMaterial } from "../gl/textures.ts";
 import type { CueChoice } from "../gl/tissue.ts";
 import { type Camera, pixelOf, type Size } from "../numbers/camera.ts";
@@ -18,6 +18,8 @@ import { PaintedTissue } from "./tissue.ts";
 export const PAINTED_LEVELS = 3;
 /** Vertices of shafts above which lines may be rough while time runs. */
 const MANY = 200_000;
+/** Opacity of lines of two pixels' width, as a share of that of one pixel's: they are to look as dark together. */
+const FAINTER = 0.6;
 /** Length of a dash in dots. */
 const DASH = 5;
 
@@ -40,8 +42,6 @@ export interface Paint {
     cones: boolean;
     /** Opacity of shafts. */
     opacity: number;
-    /** Diameter of cones in pixels. */
-    size: number;
     /** [axons, 4] colours; no opacity where hidden. */
     colours: Uint8Array;
     /** Colours of directions where shafts are coloured by them, four bytes each. */
@@ -72,8 +72,9 @@ export class PaintedLayer {
     private readonly shafts: PaintedShafts;
     private readonly tissue = new PaintedTissue();
     private readonly meshPixels: Float32Array;
-    /** By grain less one, then by shape. */
-    private stamps: Stamp[][] = [];
+    /** By shape, and their diameter in dots. */
+    private stamps: Stamp[] = [];
+    private stamped = 0;
     /** Vertices of shafts in the last picture. */
     vertices = 0;
 
@@ -86,7 +87,6 @@ export class PaintedLayer {
 
     /** Prepares colours. */
     prepare(paint: Paint): void {
-        this.stamps = [1, 2].map((grain) => SHAPES.map((shape) => stamp(Math.max(paint.size / grain, 3.4), DISTANCES[shape])));
         this.tissue.choose(paint.cues, paint.dark);
     }
 
@@ -104,10 +104,10 @@ export class PaintedLayer {
         }
         if (paint.tissue) this.tissue.paint(this.raster, this.recording.cells, this.meshPixels, concentrations);
         const { colours, hues, opacity } = paint;
-        const lines = { colours, hues, opacity, stride: level > 0 ? movingStride(count) : 1, rough: grain > 1 && count > MANY };
+        const lines = { colours, hues, opacity: opacity * (grain > 1 ? FAINTER : 1), stride: level > 0 ? movingStride(count) : 1, rough: grain > 1 && count > MANY };
         this.vertices = paint.shafts ? this.shafts.paint(this.raster, this.meshPixels, moment, camera, size, lines) : 0;
         this.paintTargets(paint, targets, { camera, size });
-        if (paint.cones) this.paintCones(paint, moment, { camera, size }, this.stamps[grain - 1]);
+        if (paint.cones) this.paintCones(paint, moment, { camera, size }, coneSize(this.recording, whole.camera) / grain);
         this.texture.needsUpdate = true;
     }
 
@@ -141,7 +141,8 @@ export class PaintedLayer {
         }
     }
 
-    private paintCones(paint: Paint, moment: Moment, { camera, size }: Sight, stamps: Stamp[]): void {
+    private paintCones(paint: Paint, moment: Moment, { camera, size }: Sight, diameter: number): void {
+        this.cutStamps(diameter);
         const looks = this.recording.statusWords.map(statusLook);
         const rim = packed(...paint.rim);
         for (let axon = 0; axon < this.recording.axonCount; axon++) {
@@ -149,7 +150,13 @@ export class PaintedLayer {
             if (!moment.visible[axon] || paint.colours[4 * axon + 3] === 0 || !look) continue;
             const fill = paint.byStatus ? packed(...look.colour) : packed(paint.colours[4 * axon], paint.colours[4 * axon + 1], paint.colours[4 * axon + 2]);
             const [x, y] = pixelOf(camera, size, [moment.tips[2 * axon], moment.tips[2 * axon + 1]]);
-            press(this.raster, stamps[SHAPES.indexOf(look.shape)], x, y, rim, fill);
+            press(this.raster, this.stamps[SHAPES.indexOf(look.shape)], x, y, rim, fill);
         }
+    }
+
+    private cutStamps(diameter: number): void {
+        if (this.stamped === diameter) return;
+        this.stamped = diameter;
+        this.stamps = SHAPES.map((shape) => stamp(diameter, DISTANCES[shape]));
     }
 }

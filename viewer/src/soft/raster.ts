@@ -1,4 +1,5 @@
 /** A picture in memory, and the few things painted into it: filled triangles, lines of one pixel, stamps. */
+import { RIMMED } from "../gl/cones.ts";
 
 /** Red, green, blue of 0…255 in one number, as the picture holds it. */
 export function packed(red: number, green: number, blue: number): number {
@@ -89,16 +90,17 @@ export interface Stamp {
     inner: Float32Array;
 }
 
-/** Makes a stamp of a diameter in pixels out of a distance from the middle. */
+/** Makes a stamp of a diameter in pixels out of a distance from the middle; a small one has no rim. */
 export function stamp(size: number, distance: (x: number, y: number, radius: number) => number): Stamp {
     const reach = Math.ceil(size / 2);
     const side = 2 * reach + 1;
     const [whole, inner] = [new Uint16Array(side * side), new Float32Array(side * side)];
-    const radius = 0.5 * size - 0.6;
+    const rimmed = size >= RIMMED;
+    const radius = rimmed ? 0.5 * size - 0.6 : 0.5 * size;
     for (let i = 0; i < whole.length; i++) {
         const away = distance((i % side) - reach, Math.floor(i / side) - reach, radius);
         whole[i] = Math.round(256 * Math.min(Math.max(radius - away + 0.5, 0), 1));
-        inner[i] = Math.min(Math.max(radius - 0.5 - away, 0), 1);
+        inner[i] = rimmed ? Math.min(Math.max(radius - 0.5 - away, 0), 1) : 1;
     }
     return { reach, whole, inner };
 }
@@ -111,7 +113,7 @@ export function press(raster: Raster, { reach, whole, inner }: Stamp, x: number,
     for (let i = 0; i < whole.length; i++) {
         if (whole[i] === 0) continue;
         const at = (top + Math.floor(i / side)) * raster.width + left + (i % side);
-        raster.blend(at, rim, whole[i]);
+        if (inner[i] < 1) raster.blend(at, rim, whole[i]);
         if (inner[i] > 0) raster.blend(at, fill, (inner[i] * whole[i]) | 0);
     }
 }

@@ -46,12 +46,13 @@ export class PaintedShafts {
         return vertices;
     }
 
-    /** One shaft; vertices nearer than a pixel to the last drawn one are passed over. */
+    /** One shaft; vertices nearer than a dot to the last drawn one, or than two where not all are painted, are passed over. */
     private paintOne(raster: Raster, meshPixels: Float32Array, tick: number, axon: number, tipX: number, tipY: number, paint: ShaftPaint): number {
         const { corners } = this;
         const { start, weights, time, end } = this.recording.shafts;
         const { stride, rough, hues, colours } = paint;
         const beyond = start[axon + 1];
+        const least = stride > 1 ? 4 : 1;
         const opacity = Math.round(256 * paint.opacity);
         const unit = 1 / 65535;
         let colour = packed(colours[4 * axon], colours[4 * axon + 1], colours[4 * axon + 2]);
@@ -78,7 +79,7 @@ export class PaintedShafts {
             if (vertices === 0) {
                 fromX = x;
                 fromY = y;
-            } else if (dx * dx + dy * dy >= 1) {
+            } else if (dx * dx + dy * dy >= least) {
                 if (hues) colour = hue(hues, Math.atan2(-dy, dx));
                 raster.line(fromX, fromY, x, y, colour, opacity, rough);
                 fromX = x;

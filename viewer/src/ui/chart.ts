@@ -26,7 +26,7 @@ function factorFigure(factor: ChartFactor): HTMLElement {
     methods.forEach(({ name, points: settings }, i) => {
         const colour = css(CATEGORIES[i % CATEGORIES.length]);
         const line = [...settings].sort((a, b) => a.error - b.error).map(({ time_s, error }, k) => `${k ? "L" : "M"}${figure.x(error).toFixed(1)} ${figure.y(time_s).toFixed(1)}`).join("");
-        figure.root.append(svg("path", { d: line, class: "line thin", stroke: colour }));
+        figure.root.append(svg("path", { d: line, class: "line thin", style: `--tone:${colour}` }));
         for (const point of settings) figure.root.append(mark(name, point, i, colour, figure.x(point.error), figure.y(point.time_s), told));
     });
     const keys = methods.map(({ name }, i) => h("li", {}, svg("svg", { viewBox: "-7 -7 14 14", class: "mark" }, svg("path", { d: SYMBOLS[i % SYMBOLS.length], fill: css(CATEGORIES[i % CATEGORIES.length]) })), name));

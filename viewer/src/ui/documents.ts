@@ -6,14 +6,19 @@ import { h } from "./dom.ts";
 export function documents(report: Report): HTMLElement[] {
     const notes = report.notes ?? [];
     return [
-        notes.length > 0 ? h("section", { class: "notes" }, h("h2", {}, "Warnings and notes"), h("ul", {}, ...notes.map((note) => h("li", {}, note)))) : null,
-        report.command || report.cite ? h("section", {}, h("h2", {}, "Run again, cite"),
-            report.command ? copyable("Run again", report.command) : null,
-            report.cite ? copyable("Cite", report.cite) : null,
+        notes.length > 0 ? h("section", { class: "notes" }, h("h2", {}, "Warnings and notes"), h("ul", {}, ...notes.map((note) => h("li", {}, ...said(note))))) : null,
+        report.command ? h("section", {}, h("h2", {}, "Run again"),
+            copyable("Run again", report.command),
             report.version ? h("p", { class: "small" }, `Made by tropism ${report.version}.`) : null) : null,
+        folded("Cite", report.cite || null),
         folded("Scenario", report.scenario),
         folded("Summary", report.summary),
     ].filter((part) => part !== null);
+}
+
+/** A note of the program as it is printed: what stands between backticks as code, µm for um. */
+function said(note: string): (Node | string)[] {
+    return note.split("`").map((part, i) => (i % 2 === 1 ? h("code", {}, part) : part.replace(/(?<=\d )um\b/g, "µm")));
 }
 
 function folded(title: string, value: unknown): HTMLElement | null {

@@ -57,14 +57,14 @@ export class MeasureFigures {
         const x = { low: Math.min(...times.map((list) => list[0])), high: Math.max(...times.map((list) => list[list.length - 1])), logarithmic: false, label: "time (h)" };
         const y = { low: least < 0 ? -roundUp(-least) : 0, high: most > 0 ? nicely(most) : 1, logarithmic: false, label: unit };
         const figure = frame(320, 190, x, y, `${title} over time`);
-        lines.forEach((line, i) => figure.root.append(svg("path", { d: path(line, figure), class: "line", stroke: colourOf(line.name, i), "stroke-dasharray": DASHES[Math.floor(i / CATEGORIES.length) % DASHES.length] })));
+        lines.forEach((line, i) => figure.root.append(svg("path", { d: path(line, figure), class: "line", style: `--tone:${colourOf(line.name, i)}`, "stroke-dasharray": DASHES[Math.floor(i / CATEGORIES.length) % DASHES.length] })));
         const cursor = svg("path", { class: "cursor" });
         figure.root.append(cursor);
         const pick = (event: PointerEvent): void => { if (event.buttons & 1) this.goTo(figure.valueAt(event.clientX)); };
         figure.root.addEventListener("pointerdown", pick);
         figure.root.addEventListener("pointermove", pick);
         const values = lines.map(() => h("b", {}));
-        const keys = lines.map(({ name }, i) => h("li", {}, h("span", { class: "swatch line", style: `background:${colourOf(name, i)}` }), `${words(name)} `, values[i]));
+        const keys = lines.map(({ name }, i) => h("li", {}, h("span", { class: "swatch line", style: `--tone:${colourOf(name, i)}` }), `${words(name)} `, values[i]));
         this.figures.push({ frame: figure, lines, cursor, values });
         this.element.append(h("figure", {}, h("figcaption", {}, title.charAt(0).toUpperCase() + title.slice(1)), figure.root, h("ul", { class: "marks" }, ...keys)));
     }

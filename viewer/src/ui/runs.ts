@@ -172,14 +172,14 @@ export class Runs {
     /** After a drawing: what is under the pointer, the card, the scale bar, and the camera behind a followed cone. */
     private showPlaces(): void {
         this.showScale();
-        const found = this.pointer && !this.transport.playing ? this.find(this.pointer) : this.hovered;
+        const found = this.pointer === null ? null : this.transport.playing ? this.hovered : this.find(this.pointer);
         if (!isSame(found, this.hovered) && found !== this.hovered) {
             this.hovered = found;
             this.stage.chosen = found ?? this.followed;
             this.stage.change();
         }
         const told = this.hovered ?? this.followed;
-        if (this.telling || told === null) this.card.show(told ? axonNumbers(this.stage.places[told.place].pane.moment, told.axon) : null, isSame(told, this.followed));
+        if (this.telling || told === null || !this.transport.playing) this.card.show(told ? axonNumbers(this.stage.places[told.place].pane.moment, told.axon) : null, isSame(told, this.followed));
         this.surface.classList.toggle("found", this.hovered !== null);
         if (this.followed && this.transport.playing) this.keepInView(this.followed);
     }

@@ -67,10 +67,11 @@ export class Transport {
         requestAnimationFrame((now) => this.tick(now));
     }
 
-    /** Stops playing. */
+    /** Stops playing; what lagged behind while time ran comes up to it. */
     pause(): void {
+        if (!this.playing) return;
         this.playing = false;
-        this.show();
+        this.goTo(this.time);
     }
 
     /** Keys of the slider and of the page; whether the key meant anything. */

@@ -70,6 +70,8 @@ test("hovering over a cone shows its numbers, a click follows it, Escape lets go
     await page.mouse.move(x, y);
     await page.locator(".card").waitFor({ state: "visible" });
     assert.match(await cardText(page), /length\s+\d+ µm/);
+    await page.mouse.move(5, 5);
+    await page.locator(".card").waitFor({ state: "hidden" });
     await page.mouse.click(x, y);
     await page.locator(".card .tag").waitFor();
     await page.mouse.move(5, 5);

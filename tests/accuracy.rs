@@ -34,7 +34,7 @@ fn scene(more: Value) -> Value {
 fn found(scene: &Value, roster: &Roster) -> Loaded {
     let folder = Folder::new();
     let path = folder.write("scene.json", &scene.to_string());
-    settled(&Request { path, without: Vec::new(), set: Vec::new() }, roster).unwrap().1
+    settled(&Request { path, without: Vec::new(), set: Vec::new() }, roster, |_| Ok(())).unwrap().1
 }
 
 fn number(loaded: &Loaded, pointer: &str) -> f64 {
@@ -106,7 +106,7 @@ fn a_scene_that_leaves_nothing_to_choose_is_refused_with_the_place() {
     let folder = Folder::new();
     let path = folder.write("scene.json", &scene.to_string());
     let request = Request { path, without: Vec::new(), set: Vec::new() };
-    let refused = settled(&request, &systems::standard()).unwrap_err().to_string();
+    let refused = settled(&request, &systems::standard(), |_| Ok(())).unwrap_err().to_string();
     assert!(refused.contains("/accuracy") && refused.contains("/tissue/mesh_size"), "{refused}");
 }
 

@@ -343,3 +343,41 @@ fn a_compression_that_has_no_equilibrium_ends_with_one_and_says_load_cell_and_st
         assert!(said.contains(words), "`{words}` is missing in:\n{said}");
     }
 }
+
+/// 10¹⁰ axons take more than a terabyte; a machine that has it would need another number here.
+#[test]
+fn a_scene_that_does_not_fit_into_memory_is_refused_before_anything_is_made_of_it() {
+    let mut large = scene();
+    large["populations"]["axons"]["count"] = json!(10_000_000_000_u64);
+    let said = refusal(&large, &[]);
+    for words in ["does not fit into memory", "TB", "leaves", "axons", "--memory any"] {
+        assert!(said.contains(words), "{words}: {said}");
+    }
+    let folder = with_scene(&large);
+    for command in ["plan", "ablate", "bench", "chart"] {
+        let output = tropism(&folder, &[command, "scene.json"]);
+        assert_eq!(code(&output), 2, "{command}");
+        assert!(errors(&output).contains("does not fit into memory"), "{command}: {}", errors(&output));
+    }
+}
+
+#[test]
+fn the_room_of_a_run_can_be_said_and_a_refused_run_writes_no_results() {
+    let folder = with_scene(&scene());
+    let with = |size: &str, more: &[&str]| tropism(&folder, &[&["scene.json", "--memory", size], more].concat());
+    // Axons and mesh alone would fit into 1 MB: it is the plan that does not.
+    let output = with("1MB", &[]);
+    assert_eq!(code(&output), 2, "{}", errors(&output));
+    assert!(errors(&output).contains("`--memory` allows 1.0 MB"), "{}", errors(&output));
+    assert!(!folder.0.join("out/scene/summary.json").exists());
+    for size in ["any", "1TB"] {
+        assert_eq!(code(&with(size, &[])), 0, "{size}");
+    }
+    let output = with("60MB", &["--seeds", "64", "--threads", "64"]);
+    assert_eq!(code(&output), 2, "{}", errors(&output));
+    assert!(errors(&output).contains("for 64 runs at once"), "{}", errors(&output));
+    assert_eq!(code(&with("60", &[])), 2, "a size has a unit");
+    let output = tropism(&folder, &["plan", "scene.json", "--memory", "1MB"]);
+    assert_eq!(code(&output), 0);
+    assert!(errors(&output).contains("does not fit into memory"), "{}", errors(&output));
+}

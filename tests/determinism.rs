@@ -2,8 +2,10 @@
 
 mod common;
 
-use common::{Fnv, ended, hash_of_states, loaded, observed, recorded};
+use common::{ConeState, Fnv, cones, ended, hash_of_states, loaded, observed, recorded};
 use serde_json::{Value, json};
+use tropism::model::shafts::Shafts;
+use tropism::numerics::locate::MaterialPoint;
 use tropism::scenario::load::Loaded;
 use tropism::study::seeds::over_seeds;
 use tropism::systems;
@@ -107,6 +109,77 @@ fn grid_and_tree_find_what_is_left_when_shafts_are_remodelled_on_any_number_of_t
             assert_eq!(run(border, neighbours, 2), all, "{border} {neighbours}");
         }
     }
+}
+
+/// Five axons without a random draw, each a population, in memory in the order of these names.
+fn axons_named(names: [&str; 5], contact: bool) -> Value {
+    let mut scene = scene(0, 4.0, contact);
+    let axon = |(i, name): (usize, &&str)| {
+        let i = i as f64;
+        let keys = json!({
+            "count": 1, "speed": 18.0 + i, "heading": 80.0 + 5.0 * i, "births": { "at": 0.1 * i },
+            "origin": { "points": [[180.0 + 4.0 * i, 40.0 + 2.0 * i]] }
+        });
+        ((*name).to_owned(), keys)
+    };
+    scene["populations"] = names.iter().enumerate().map(axon).collect::<serde_json::Map<_, _>>().into();
+    scene["heading_noise"] = Value::Null;
+    scene
+}
+
+/// Where each of those axons is at the end, and its shaft, in the order of `names`.
+fn ends_of(names: [&str; 5], contact: bool) -> Vec<(ConeState, Vec<MaterialPoint<2>>)> {
+    let simulation = ended(&axons_named(names, contact), &systems::standard());
+    let (cones, shafts) = (cones(simulation.world()), simulation.world().resource::<Shafts>());
+    let mut sorted = names;
+    sorted.sort_unstable();
+    let end = |name: &&str| {
+        let row = sorted.iter().position(|other| other == name).unwrap();
+        let mut cone = cones[row];
+        assert_eq!(cone.identity.axon as usize, row, "axons lie in memory in the order of their numbers");
+        (cone.identity.axon, cone.identity.population) = (0, 0);
+        (cone, shafts.polyline(row))
+    };
+    names.iter().map(end).collect()
+}
+
+#[test]
+fn axons_that_lie_otherwise_in_memory_end_with_the_same_bits_each() {
+    let ends = ends_of(["a", "b", "c", "d", "e"], false);
+    assert!(ends.iter().all(|(cone, shaft)| cone.journey.length > 60.0 && shaft.len() > 4));
+    for names in [["e", "d", "c", "b", "a"], ["c", "a", "e", "b", "d"]] {
+        assert_eq!(ends_of(names, false), ends, "{names:?}");
+    }
+}
+
+/// What a cone feels of shafts is summed in the order in which they were laid, those of one step in the order of their numbers; that order,
+/// and with it the last digit, is part of the scene.
+#[test]
+fn with_contact_another_order_in_memory_changes_no_more_than_round_off() {
+    let (alone, ends) = (ends_of(["a", "b", "c", "d", "e"], false), ends_of(["a", "b", "c", "d", "e"], true));
+    let others = ends_of(["c", "a", "e", "b", "d"], true);
+    for (((one, _), (other, _)), (alone, _)) in ends.iter().zip(&others).zip(&alone) {
+        assert!((one.position - alone.position).norm() > 1.0, "there is no contact");
+        let apart = (one.position - other.position).norm();
+        assert!(apart < 1e-9, "{apart} um apart");
+    }
+}
+
+/// The order of keys in a file is no order of anything.
+#[test]
+fn populations_and_cues_in_another_order_in_the_file_give_the_same_bits() {
+    let roster = systems::standard();
+    let reversed = |value: &Value| -> Value {
+        value.as_object().unwrap().iter().rev().map(|(key, value)| (key.clone(), value.clone())).collect()
+    };
+    let mut scene = scene(30, 3.0, true);
+    scene["populations"]["others"] = json!({ "count": 20, "births": { "at": 0.5 } });
+    let mut turned = reversed(&scene);
+    for block in ["populations", "cues"] {
+        turned[block] = reversed(&scene[block]);
+    }
+    assert_ne!(turned.to_string(), scene.to_string());
+    assert_eq!(bits(&loaded(&turned, &roster)), bits(&loaded(&scene, &roster)));
 }
 
 #[test]

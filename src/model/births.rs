@@ -46,6 +46,11 @@ impl BirthQueue {
         Self { order, next: 0 }
     }
 
+    /// Whether a queue that nobody was taken from may become `later`.
+    pub(super) fn may_become(&self, later: &Self) -> bool {
+        later.order == self.order && later.next <= later.order.len()
+    }
+
     fn take_before(&mut self, instant: u64) -> &[(u64, u32)] {
         let due = self.order[self.next..].iter().take_while(|(birth, _)| *birth < instant).count();
         let from = self.next;

@@ -96,6 +96,12 @@ impl Clock {
         whole.min(self.end - self.now).min(self.stop - self.now)
     }
 
+    /// Whether a clock at the start of a run may stand as `later` does.
+    pub(super) fn may_become(&self, later: &Self) -> bool {
+        let step = later.step.is_power_of_two() && later.step <= self.grid.step;
+        (later.grid, later.end) == (self.grid, self.end) && step && later.now <= later.end && later.now < later.stop
+    }
+
     /// Whether the end is reached.
     pub fn is_over(&self) -> bool {
         self.now >= self.end

@@ -12,6 +12,7 @@ use super::health::{Counters, Health};
 use super::keep::{Damage, Keep, KeptBytes};
 use super::remodel::{SpareCones, Unrest};
 use super::shafts::Shafts;
+use super::sound::Given;
 use super::stopwatch::Stopwatch;
 use bevy_ecs::component::Mutable;
 use bevy_ecs::prelude::{Component, Resource, With, World};
@@ -91,6 +92,7 @@ impl KeptState {
     /// # Errors
     /// The first part that does not fit; the world is of no use then.
     pub fn read(&self, world: &mut World, bytes: &[u8]) -> Result<(), Damage> {
+        let given = Given::of(world);
         let mut from = KeptBytes::new(bytes);
         for Entry { name, read, .. } in &self.entries {
             let found: String = from.read()?;
@@ -107,6 +109,7 @@ impl KeptState {
         if from.left() > 0 {
             return Err(Damage(format!("it holds {} bytes more than this scene keeps", from.left())));
         }
+        given.fits(world)?;
         self.rebuilders.iter().for_each(|rebuild| rebuild(world));
         Ok(())
     }

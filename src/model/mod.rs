@@ -29,6 +29,7 @@ pub mod settle;
 pub mod shafts;
 pub mod shape;
 pub mod shelf;
+mod sound;
 pub mod stopwatch;
 pub mod tissue;
 pub mod unit;

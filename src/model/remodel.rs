@@ -38,6 +38,13 @@ impl SpareCones {
         Self { axons, each, forks: vec![None; (axons * each) as usize] }
     }
 
+    /// Whether spare cones of which none is in use may become `later`.
+    pub(super) fn may_become(&self, later: &Self) -> bool {
+        let same = (later.axons, later.each, later.forks.len()) == (self.axons, self.each, self.forks.len());
+        let cones = self.axons as usize + self.forks.len();
+        same && later.forks.iter().flatten().all(|fork| (fork.parent as usize) < cones)
+    }
+
     /// The axon that a cone belongs to: its own number, or that of the axon whose branch it is.
     pub fn root(&self, cone: u32) -> u32 {
         if cone < self.axons { cone } else { (cone - self.axons) / self.each.max(1) }

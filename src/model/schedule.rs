@@ -151,3 +151,53 @@ fn strict(label: impl ScheduleLabel) -> Schedule {
     });
     schedule
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use bevy_ecs::prelude::{Res, ResMut};
+
+    #[derive(Resource, Default)]
+    struct Sum(f64);
+
+    fn add_a_third(mut sum: ResMut<Sum>) {
+        sum.0 += 1.0 / 3.0;
+    }
+
+    fn double(mut sum: ResMut<Sum>) {
+        sum.0 *= 2.0;
+    }
+
+    fn look(sum: Res<Sum>) {
+        assert!(sum.0.is_finite());
+    }
+
+    fn refusal(add: impl FnOnce(&mut Schedules)) -> Option<String> {
+        let mut schedules = Schedules::new();
+        let mut world = World::new();
+        world.init_resource::<Sum>();
+        add(&mut schedules);
+        schedules.initialize(&mut world).err()
+    }
+
+    /// So whatever order the library takes where none is given, the bits are the same: systems without an order share nothing that one of
+    /// them writes.
+    #[test]
+    fn systems_whose_order_could_change_a_bit_are_refused_without_one_in_every_schedule() {
+        let both = || (add_a_third, double);
+        assert!(refusal(|all| _ = all.step.add_systems(both().in_set(Phase::Remodel))).is_some());
+        assert!(refusal(|all| _ = all.motion.add_systems(both().in_set(Motion::Matrix))).is_some());
+        assert!(refusal(|all| _ = all.right_hand_side.add_systems(both().in_set(Term::Turn))).is_some());
+        assert!(refusal(|all| _ = all.right_hand_side.add_systems((double, look).in_set(Term::Turn))).is_some());
+    }
+
+    #[test]
+    fn systems_with_an_order_or_with_nothing_in_common_are_taken() {
+        assert_eq!(refusal(|all| _ = all.step.add_systems((add_a_third, double).chain().in_set(Phase::Remodel))), None);
+        let apart = |all: &mut Schedules| {
+            all.right_hand_side.add_systems((double.in_set(Term::Sample), look.in_set(Term::Turn)));
+        };
+        assert_eq!(refusal(apart), None);
+        assert_eq!(refusal(|all| _ = all.step.add_systems((look, || ()).in_set(Phase::Remodel))), None);
+    }
+}

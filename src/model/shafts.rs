@@ -5,6 +5,8 @@
 //! material. They lie in blocks of a fixed number in flat arrays; blocks are linked shaft by shaft, so that a shaft can
 //! grow without moving others and parts can later be struck out. A planar vertex takes 24 bytes.
 
+mod sound;
+
 use super::components::Site;
 use super::open_end::OpenEnd;
 use crate::kept;

@@ -14,7 +14,7 @@ mod expressions;
 mod files;
 pub mod load;
 pub mod merge;
-mod outline_file;
+pub mod outline_file;
 pub mod overrides;
 mod population;
 mod ranges;

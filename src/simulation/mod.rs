@@ -7,6 +7,7 @@ mod assemble;
 mod populate;
 
 pub use assemble::AssemblyError;
+pub use populate::BYTES_AN_AXON;
 
 use crate::model::adaptive::idle_until;
 use crate::model::clock::{Clock, StageTime};

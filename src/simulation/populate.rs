@@ -44,7 +44,7 @@ const LONGEST_SEGMENT: f64 = 12.0;
 type ConeState = (GrowthCone, Origin, Status, Site, Position, Velocity, SpringState, ReceptorWeights, Journey);
 
 /// Bytes of an axon and its growth cone: their components, and what is kept of the cone during a step.
-pub(super) const BYTES_AN_AXON: usize = size_of::<Axon>() + size_of::<ConeState>() + BYTES_A_STEP;
+pub const BYTES_AN_AXON: usize = size_of::<Axon>() + size_of::<ConeState>() + BYTES_A_STEP;
 
 /// Entities kept free for the resources that come after the cones. A resource is an entity too, and is looked up in a list as long
 /// as the number of that entity: behind the cones it would take eight bytes of each for every resource.

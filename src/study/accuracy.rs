@@ -78,12 +78,17 @@ pub struct Found {
 }
 
 /// Reads a scene; where it states an accuracy, finds the keys for it and puts them in its place. Returns the request that gives
-/// the scene without further search.
+/// the scene without further search. `admit` looks at what has been read before any pilot is run.
 ///
 /// # Errors
-/// All problems of the scene; one that cannot be assembled or run.
-pub fn settled(request: &Request, roster: &Roster) -> Result<(Request, Loaded), RunError> {
+/// All problems of the scene; one that cannot be assembled or run; what `admit` refuses.
+pub fn settled(
+    request: &Request,
+    roster: &Roster,
+    admit: impl FnOnce(&Loaded) -> Result<(), RunError>,
+) -> Result<(Request, Loaded), RunError> {
     let mut loaded = read(request, roster)?;
+    admit(&loaded)?;
     let mut request = request.clone();
     if loaded.scene.accuracy.is_none() {
         return Ok((request, loaded));

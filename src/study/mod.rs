@@ -11,6 +11,7 @@ pub mod pictures;
 pub mod plan;
 pub mod report;
 pub mod resume;
+pub mod room;
 pub mod run;
 pub mod seeds;
 pub mod stability;

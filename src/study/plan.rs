@@ -13,6 +13,7 @@ use crate::record::png::scale_for_dpi;
 use crate::record::recorder::Recorder;
 use crate::record::summary::{DerivedConstants, constants};
 use crate::scenario::load::Loaded;
+use crate::simulation::Simulation;
 use bevy_ecs::prelude::World;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -56,6 +57,16 @@ pub struct ScenePlan {
 /// A scene that cannot be assembled.
 pub fn plan(loaded: &Loaded, roster: &Roster, path: &Path) -> Result<ScenePlan, RunError> {
     let mut simulation = assembled(loaded, roster, path)?;
+    let found = plan_of(&simulation, loaded)?;
+    simulation.lap("plan");
+    Ok(found)
+}
+
+/// What a scene needs that has been put together and has not taken a step.
+///
+/// # Errors
+/// A tissue without extent.
+pub fn plan_of(simulation: &Simulation, loaded: &Loaded) -> Result<ScenePlan, RunError> {
     let world: &World = simulation.world();
     let clock = *world.resource::<Clock>();
     let lifetimes = lifetimes(world, &clock);
@@ -66,7 +77,7 @@ pub fn plan(loaded: &Loaded, roster: &Roster, path: &Path) -> Result<ScenePlan, 
     let mesh = &world.resource::<Tissue>().mesh;
     let mut plan = world.resource::<Plan>().clone();
     tell_outputs(&mut plan, loaded, &recorder);
-    let found = ScenePlan {
+    Ok(ScenePlan {
         scene: loaded.scene.name.clone(),
         plan,
         derived: constants(world),
@@ -80,9 +91,7 @@ pub fn plan(loaded: &Loaded, roster: &Roster, path: &Path) -> Result<ScenePlan, 
         cpu_seconds: seconds::estimate(world, &expected),
         expected,
         notes: world.resource::<Health>().notes().to_vec(),
-    };
-    simulation.lap("plan");
-    Ok(found)
+    })
 }
 
 /// The files that a run writes, and what for.

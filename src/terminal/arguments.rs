@@ -8,6 +8,7 @@ use crate::model::mechanism::Roster;
 use crate::scenario::load::{Loaded, Request};
 use crate::study::accuracy;
 use crate::study::chart;
+use crate::study::room::Room;
 use crate::study::run::RunError;
 use clap::{Args, Parser, Subcommand};
 use std::path::PathBuf;
@@ -175,6 +176,9 @@ pub struct SceneArguments {
     /// Set one key, named by its JSON pointer (repeatable)
     #[arg(long, value_name = "/POINTER=VALUE")]
     pub set: Vec<String>,
+    /// Refuse a scene that needs more memory than this, e.g. 8GB, or than is `free`; `any` refuses none
+    #[arg(long, value_name = "SIZE", default_value = "free", value_parser = Room::parse)]
+    pub memory: Room,
 }
 
 impl SceneArguments {
@@ -186,7 +190,7 @@ impl SceneArguments {
     /// The scene with the keys that its accuracy asks for, and the request that gives it.
     pub fn settled(&self, roster: &Roster) -> Result<(Request, Loaded), RunError> {
         let request = Request { path: self.path(), without: self.without.clone(), set: self.set.clone() };
-        let (request, loaded) = accuracy::settled(&request, roster)?;
+        let (request, loaded) = accuracy::settled(&request, roster, |read| self.memory.admit_outlook(&read.scene))?;
         for hint in &loaded.hints {
             note!("hint: {hint}");
         }

@@ -18,6 +18,7 @@ use crate::study::chart;
 use crate::study::laboratory::Laboratory;
 use crate::study::plan::plan;
 use crate::study::report::Asked;
+use crate::study::room::Room;
 use crate::study::run::{RunError, block_schemas, folder_of, write_figure, write_json, write_pooled_figure};
 use crate::study::seeds::{SeedsSummary, over_seeds_until, summarise};
 use crate::study::stability::Stability;
@@ -31,13 +32,27 @@ use std::process::ExitCode;
 /// # Errors
 /// Why there are no results, or not all of them.
 pub fn run_plan(scene: &SceneArguments, json: bool, roster: &Roster) -> Result<ExitCode, RunError> {
-    let found = plan(&scene.load(roster)?, roster, &scene.path())?;
+    let mut found = plan(&scene.load(roster)?, roster, &scene.path())?;
+    let admitted = scene.memory.admit(&found.scene, &found.memory_mb, 1);
+    found.notes.extend(admitted.err().map(|refusal| refusal.to_string()));
     if json {
         return print_json(&found);
     }
     say!("{}", found.to_string().trim_end());
     found.notes.iter().for_each(|note| note!("note: {note}"));
     Ok(ExitCode::SUCCESS)
+}
+
+/// Lets a scene through of which as many runs fit as threads would have at once, of `count` in all.
+///
+/// # Errors
+/// A scene that cannot be assembled, or so many of which do not fit.
+fn admit_many(scene: &SceneArguments, loaded: &Loaded, roster: &Roster, count: u64) -> Result<(), RunError> {
+    if scene.memory == Room::Any {
+        return Ok(());
+    }
+    let at_once = (rayon::current_num_threads() as u64).min(count) as usize;
+    scene.memory.admit(&loaded.scene.name, &plan(loaded, roster, &scene.path())?.memory_mb, at_once)
 }
 
 /// Prints a value as JSON.
@@ -104,6 +119,7 @@ pub fn run_ablation(
     roster: &Roster,
 ) -> Result<ExitCode, RunError> {
     let loaded = scene.load(roster)?;
+    admit_many(scene, &loaded, roster, u64::MAX)?;
     let folder = folder_of(out, &format!("{}-ablation", loaded.scene.name));
     prepare_folder(&folder)?;
     let bar = progress_bar(100.0, "%");
@@ -184,6 +200,7 @@ pub fn run_stability(folder: &Path, roster: &Roster) -> Result<ExitCode, RunErro
 /// # Errors
 /// Why there are no results, or not all of them.
 pub fn run_seeds(cli: &Cli, roster: &Roster, loaded: &Loaded, folder: &Path, count: u64) -> Result<ExitCode, RunError> {
+    admit_many(&cli.scene, loaded, roster, count)?;
     let interrupt = Interrupt::catch().map_err(|error| RunError::Internal(error.to_string()))?;
     checkpoint::remove(folder)?;
     let bar = progress_bar(count as f64, "seeds");

@@ -130,7 +130,7 @@ fn execute(cli: &Cli, roster: &Roster) -> Result<ExitCode, RunError> {
         None => run_once(
             (Asked { loaded: &loaded, command: &cli.words }, &cli.scene.path()),
             roster,
-            &folder,
+            (&folder, cli.scene.memory),
             cli.checkpoint,
         ),
         Some(count) => run_seeds(cli, roster, &loaded, &folder, count),

@@ -7,8 +7,10 @@ use crate::model::mechanism::Roster;
 use crate::model::quantity::{Quantity, Time};
 use crate::record::checkpoint;
 use crate::record::output::prepare_folder;
+use crate::study::plan::plan_of;
 use crate::study::report::Asked;
 use crate::study::resume::{Checkpoints, Found, Resumed, pick_up};
+use crate::study::room::Room;
 use crate::study::run::{Ended, Records, Run, RunError, write_results};
 use std::path::Path;
 use std::process::ExitCode;
@@ -27,14 +29,15 @@ pub fn seconds(text: &str) -> Result<f64, String> {
 /// Runs a scene to its end and writes its results into a folder.
 ///
 /// # Errors
-/// A scene that cannot be assembled; a file that cannot be written.
+/// A scene that cannot be assembled, or does not fit into `room`; a file that cannot be written.
 pub fn run_once(
     (asked, path): (Asked, &Path),
     roster: &Roster,
-    folder: &Path,
+    (folder, room): (&Path, Room),
     interval: Option<f64>,
 ) -> Result<ExitCode, RunError> {
     let mut run = Run::begin(asked.loaded, roster, path, Records::ALL)?;
+    room.admit(&asked.loaded.scene.name, &plan_of(&run.simulation, asked.loaded)?.memory_mb, 1)?;
     run.writes_into(folder, asked.loaded)?;
     let mut checkpoints = Checkpoints::new(folder, interval, (asked, path));
     checkpoints.begin(&run)?;

@@ -74,19 +74,27 @@ pub fn take_in(document: &mut Value, folder: &Path) -> Result<(), Violation> {
     let filed: FiledOutline = serde_json::from_value(outline.clone()).map_err(|error| at("", error.to_string()))?;
     let (FiledOutline::Geojson(keys) | FiledOutline::Svg(keys) | FiledOutline::Gmsh(keys)) = &filed;
     let text = read_inside(folder, &keys.file).map_err(|message| at("/file", message))?;
-    let found = match &filed {
-        FiledOutline::Geojson(_) => geojson::read(&text),
-        FiledOutline::Svg(keys) => svg::read(&text, keys.tolerance.0 / keys.scale.0),
-        FiledOutline::Gmsh(_) => gmsh::read(&text),
-    };
-    let in_file = |message: String| at("/file", format!("{}: {message}", keys.file));
-    let found = found.map_err(in_file)?;
+    *outline = polygon(&filed, &text).map_err(|message| at("/file", format!("{}: {message}", keys.file)))?;
+    Ok(())
+}
+
+/// The polygon that the text of a file describes, as it stands under `/tissue/outline`; coordinates in µm.
+///
+/// # Errors
+/// What is wrong in the text, and where.
+pub fn polygon(filed: &FiledOutline, text: &str) -> Result<Value, String> {
+    let (FiledOutline::Geojson(keys) | FiledOutline::Svg(keys) | FiledOutline::Gmsh(keys)) = filed;
+    let found = match filed {
+        FiledOutline::Geojson(_) => geojson::read(text),
+        FiledOutline::Svg(keys) => svg::read(text, keys.tolerance.0 / keys.scale.0),
+        FiledOutline::Gmsh(_) => gmsh::read(text),
+    }?;
     let in_rings: usize = found.rings.iter().map(|ring| ring.points.len()).sum();
     let count = in_rings + found.lines.iter().map(|(_, line)| line.len()).sum::<usize>();
     if count > MOST_POINTS {
-        return Err(in_file(format!("{count} points; at most {MOST_POINTS} are taken")));
+        return Err(format!("{count} points; at most {MOST_POINTS} are taken"));
     }
-    let rings = naming::named(found).map_err(in_file)?;
+    let rings = naming::named(found)?;
     let written = |(place, ring): (usize, &FoundRing)| {
         let points: Vec<_> = ring.points.iter().map(|point| point.map(|x| x * keys.scale.0)).collect();
         let default = if place == 0 { "outer" } else { "hole" };
@@ -95,8 +103,7 @@ pub fn take_in(document: &mut Value, folder: &Path) -> Result<(), Violation> {
     };
     let mut written: Vec<Value> = rings.iter().enumerate().map(written).collect();
     let outer = written.remove(0);
-    *outline = json!({ "polygon": { "outer": outer, "holes": written } });
-    Ok(())
+    Ok(json!({ "polygon": { "outer": outer, "holes": written } }))
 }
 
 /// The text of a file inside a folder.

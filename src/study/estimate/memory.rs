@@ -11,11 +11,11 @@ use crate::record::scene_figure::{FigureError, bytes_to_draw};
 use bevy_ecs::prelude::World;
 
 /// Bytes in a megabyte.
-const MEGABYTE: f64 = 1e6;
+pub(super) const MEGABYTE: f64 = 1e6;
 /// The program, its schemas and schedules (bytes).
 const PROGRAM: f64 = 9.5e6;
 /// Meshing and setting up fields, a vertex of the mesh (bytes): most of it is given back, but stays with the process.
-const SETTING_UP: f64 = 1100.0;
+pub(super) const SETTING_UP: f64 = 1100.0;
 /// A row of `trajectories.csv`, as it stands in memory until it is written (bytes).
 const ROW: f64 = 80.0;
 /// A shaft vertex in a snapshot, its panel and the drawing (bytes).

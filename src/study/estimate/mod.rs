@@ -2,9 +2,10 @@
 //!
 //! The parts of a scene have told its [`Plan`] what they hold in memory and what they do how often, for each axon, stored vertex,
 //! step or stage. How many of these there will be is an [`Expectation`]; how long one of them takes stands in [`seconds`], how much
-//! memory the program takes besides in [`memory`].
+//! memory the program takes besides in [`memory`]. What is known before a scene is put together: [`outlook`].
 
 pub mod memory;
+pub mod outlook;
 pub mod seconds;
 
 use crate::model::clock::Clock;

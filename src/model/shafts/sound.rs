@@ -1,0 +1,95 @@
+//! Whether shafts that were read back hold together: chains that lead through their own blocks and end, vertices in cells that are there.
+
+use super::{BLOCK, Chain, NONE, Shafts};
+
+impl Shafts {
+    /// What makes these shafts impossible in a scene whose fresh ones are `fresh`, on a mesh of `cells` cells; none if nothing does.
+    pub(in crate::model) fn defect(&self, fresh: &Self, cells: usize) -> Option<&'static str> {
+        let (blocks, places) = (self.used.len(), self.used.len().saturating_mul(BLOCK));
+        let of_blocks = [self.fresh.len(), self.next.len(), self.before.len(), self.owner.len()];
+        let of_places = [self.cells.len(), self.times.len(), self.weights.len()];
+        let there = |cell: u32| (cell as usize) < cells;
+        let checks: [(&'static str, &dyn Fn() -> bool); 6] = [
+            ("they are those of another scene", &|| {
+                let own = (self.tolerance, self.longest, self.chains.len());
+                own == (fresh.tolerance, fresh.longest, fresh.chains.len())
+            }),
+            ("blocks and vertices are not of one number", &|| {
+                of_blocks.iter().all(|&count| count == blocks) && of_places.iter().all(|&count| count == places)
+            }),
+            ("a block holds more than it can", &|| self.used.iter().all(|&used| usize::from(used) <= BLOCK)),
+            ("a vertex lies in no cell", &|| self.cells.iter().all(|&cell| there(cell))),
+            ("a tip lies in no cell", &|| self.chains.iter().all(|chain| there(chain.tip.cell))),
+            ("a vertex that was laid or struck out is none", &|| {
+                let laid = self.laid.iter().all(|&vertex| (vertex as usize) < places);
+                laid && self.struck.iter().all(|struck| (struck.vertex as usize) < places && there(struck.point.cell))
+            }),
+        ];
+        let broken = checks.iter().find(|(_, fine)| !fine()).map(|(words, _)| *words);
+        broken.or_else(|| {
+            (!self.chains_lead_through_their_blocks()).then_some("a chain of blocks does not hold together")
+        })
+    }
+
+    /// Whether each shaft's blocks, none empty, follow each other both ways and belong to no other, and blocks of no shaft are empty.
+    fn chains_lead_through_their_blocks(&self) -> bool {
+        let mut seen = vec![false; self.used.len()];
+        for (shaft, Chain { first, last, .. }) in self.chains.iter().enumerate() {
+            let (mut at, mut before) = (*first, NONE);
+            while at != NONE {
+                let block = at as usize;
+                let is_next = seen.get(block) == Some(&false) && self.used[block] > 0;
+                if !(is_next && self.owner[block] as usize == shaft && self.before[block] == before) {
+                    return false;
+                }
+                seen[block] = true;
+                (at, before) = (self.next[block], at);
+            }
+            if before != *last {
+                return false;
+            }
+        }
+        seen.iter().zip(&self.used).all(|(seen, used)| *seen || *used == 0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::components::Site;
+
+    fn laid() -> Shafts {
+        let mut shafts = Shafts::new(2, 0.5, 12.0);
+        shafts.watch();
+        for shaft in [0, 1] {
+            shafts.start(shaft, Site::default(), [0.0; 2], 0.0);
+            (1..40).for_each(|i| shafts.extend(shaft, Site::default(), [12.0 * f64::from(i), 0.0], 1.0));
+        }
+        shafts
+    }
+
+    #[test]
+    fn shafts_that_were_laid_are_sound_and_each_break_is_seen() {
+        let fresh = Shafts::new(2, 0.5, 12.0);
+        assert_eq!(laid().defect(&fresh, 1), None);
+        let breaks: [fn(&mut Shafts); 12] = [
+            |shafts| shafts.longest = 0.0,
+            |shafts| shafts.chains.truncate(1),
+            |shafts| _ = shafts.times.pop(),
+            |shafts| _ = shafts.owner.pop(),
+            |shafts| shafts.used[0] = 17,
+            |shafts| shafts.cells[3] = 1,
+            |shafts| shafts.chains[1].tip.cell = 7,
+            |shafts| shafts.laid.push(1000),
+            |shafts| shafts.next[shafts.chains[0].last as usize] = shafts.chains[0].first,
+            |shafts| shafts.chains[0].first = 99,
+            |shafts| shafts.chains[0].last = shafts.chains[0].first,
+            |shafts| shafts.owner[0] = 1,
+        ];
+        for (place, spoil) in breaks.iter().enumerate() {
+            let mut spoilt = laid();
+            spoil(&mut spoilt);
+            assert!(spoilt.defect(&fresh, 1).is_some(), "break {place}");
+        }
+    }
+}

@@ -1,0 +1,84 @@
+//! Whether a state that was read back can be one of its scene. Its checksum tells damage; this tells what has the right checksum and was
+//! never written all the same: what the scene alone decides must be as the scene decides it, and what names a cell, a cone or a block must
+//! name one that is there. Looked at is the state of the core; what mechanisms keep is read by its kind alone.
+
+use super::births::BirthQueue;
+use super::clock::{Clock, StageTime};
+use super::components::{GrowthCone, Site};
+use super::keep::Damage;
+use super::remodel::SpareCones;
+use super::shafts::Shafts;
+use super::tissue::Tissue;
+use bevy_ecs::prelude::{With, World};
+
+/// The latest stage over the end of the run: it is a sum, which round-off may lift above the end.
+const LATEST: f64 = 1.0 + 1e-9;
+
+/// What a world that has just been put together says of any state of its scene.
+pub(super) struct Given {
+    clock: Option<Clock>,
+    births: Option<BirthQueue>,
+    spares: Option<SpareCones>,
+    shafts: Option<Shafts>,
+    cones: Vec<(u32, u16)>,
+}
+
+impl Given {
+    /// Of a world that has just been put together.
+    pub(super) fn of(world: &World) -> Self {
+        Self {
+            clock: world.get_resource::<Clock>().copied(),
+            births: world.get_resource::<BirthQueue>().cloned(),
+            spares: world.get_resource::<SpareCones>().cloned(),
+            shafts: world.get_resource::<Shafts>().cloned(),
+            cones: identities(world),
+        }
+    }
+
+    /// Whether the world's state, by now read back, fits.
+    ///
+    /// # Errors
+    /// The part that does not.
+    pub(super) fn fits(&self, world: &World) -> Result<(), Damage> {
+        let cells = world.get_resource::<Tissue>().map_or(usize::MAX, |tissue| tissue.mesh.cell_count());
+        let clock = world.get_resource::<Clock>();
+        let stage = world.get_resource::<StageTime>();
+        let checks = [
+            ("clock", both(&self.clock, clock, Clock::may_become)),
+            (
+                "stage time",
+                both(&self.clock, stage, |clock, stage| {
+                    (0.0..=LATEST * clock.grid.hours(clock.end)).contains(&stage.0)
+                }),
+            ),
+            ("births", both(&self.births, world.get_resource(), BirthQueue::may_become)),
+            ("spare cones", both(&self.spares, world.get_resource(), SpareCones::may_become)),
+            ("identities", identities(world) == self.cones),
+            ("sites", sites_are_in(cells, world)),
+        ];
+        if let Some((name, _)) = checks.iter().find(|(_, fine)| !fine) {
+            return Err(Damage(format!("`{name}`: no run of this scene comes to it")));
+        }
+        let defect = self.shafts.as_ref().zip(world.get_resource::<Shafts>());
+        match defect.and_then(|(fresh, read)| read.defect(fresh, cells)) {
+            Some(defect) => Err(Damage(format!("`shafts`: {defect}"))),
+            None => Ok(()),
+        }
+    }
+}
+
+/// Whether two things that are both there, or not, belong together.
+fn both<A, B>(given: &Option<A>, read: Option<&B>, belong: impl FnOnce(&A, &B) -> bool) -> bool {
+    given.as_ref().zip(read).is_none_or(|(given, read)| belong(given, read))
+}
+
+/// Number and population of each cone, in order.
+fn identities(world: &World) -> Vec<(u32, u16)> {
+    let Some(mut cones) = world.try_query_filtered::<&GrowthCone, With<GrowthCone>>() else { return Vec::new() };
+    cones.iter(world).map(|cone| (cone.axon, cone.population)).collect()
+}
+
+fn sites_are_in(cells: usize, world: &World) -> bool {
+    let Some(mut sites) = world.try_query_filtered::<&Site, With<GrowthCone>>() else { return true };
+    sites.iter(world).all(|site| (site.cell as usize) < cells && site.weights.iter().all(|weight| weight.is_finite()))
+}

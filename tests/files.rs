@@ -134,7 +134,7 @@ fn sweeps_write_little_and_the_plan_names_what_a_run_writes() {
     run(&folder, &[&ALL[..], &["--seeds", "2"]].concat());
     assert_eq!(
         names(folder.0.join("out/scene")),
-        ["figure.png", "figure.svg", "manifest.json", "summary.json", "trajectories.csv"]
+        ["figure.png", "figure.svg", "manifest.json", "seeds.png", "seeds.svg", "summary.json", "trajectories.csv"]
     );
     let output = tropism(&folder, &[&["plan", "scene.json"], &ALL[..]].concat());
     let words = String::from_utf8_lossy(&output.stdout).into_owned();
@@ -203,6 +203,67 @@ fn an_error_is_drawn_at_its_place_in_the_file() {
     folder.write("scene.json", "{\n  \"seed\": 1,,\n}\n");
     let said = errors(&tropism(&folder, &["scene.json"]));
     assert!(said.ends_with("     2 |   \"seed\": 1,,\n       |             ^\n"), "{said}");
+}
+
+/// A Gmsh file: the rectangle of 300 by 200 in a grid of cells, its lower side called `floor`, its middle nodes moved.
+fn gmsh(columns: usize, rows: usize) -> String {
+    let number = |i: usize, j: usize| 1 + i + j * (columns + 1);
+    let (mut nodes, mut elements) = (Vec::new(), Vec::new());
+    for (j, i) in (0..=rows).flat_map(|j| (0..=columns).map(move |i| (j, i))) {
+        let inside = i % columns > 0 && j % rows > 0;
+        let moved = if inside { 3.0 * ((i * j) as f64).sin() } else { 0.0 };
+        let [x, y] = [300.0 * i as f64 / columns as f64 + moved, 200.0 * j as f64 / rows as f64 - moved];
+        nodes.push(format!("{} {x} {y} 0", number(i, j)));
+    }
+    for (j, i) in (0..rows).flat_map(|j| (0..columns).map(move |i| (j, i))) {
+        let [a, b, c, d] = [number(i, j), number(i + 1, j), number(i + 1, j + 1), number(i, j + 1)];
+        elements.extend([format!("2 2 2 1 {a} {b} {c}"), format!("2 2 2 1 {a} {c} {d}")]);
+    }
+    elements.extend((0..columns).map(|i| format!("1 2 1 1 {} {}", number(i, 0), number(i + 1, 0))));
+    let numbered: Vec<_> = elements.iter().zip(1..).map(|(element, i)| format!("{i} {element}")).collect();
+    format!(
+        "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$PhysicalNames\n1\n1 1 \"floor\"\n$EndPhysicalNames\n$Nodes\n{}\n{}\n$EndNodes\n\
+         $Elements\n{}\n{}\n$EndElements\n",
+        nodes.len(),
+        nodes.join("\n"),
+        numbered.len(),
+        numbered.join("\n")
+    )
+}
+
+#[test]
+fn a_mesh_of_gmsh_gives_border_names_and_if_asked_for_its_vertices() {
+    let (columns, rows) = (12, 8);
+    let mut scene = scene();
+    scene["tissue"] =
+        json!({ "outline": { "gmsh": { "file": "tissue.msh", "keep_vertices": true } }, "mesh_size": 40 });
+    scene["matrix"] = json!({ "motion": { "floor": { "outward": 0.1 }, "outer": { "outward": 0.0 } } });
+    scene["populations"]["axons"]["origin"] = json!({ "edge": "floor" });
+    let folder = with_scene(&scene);
+    folder.write("tissue.msh", &gmsh(columns, rows));
+    let vertices = |out: &str| -> u64 {
+        let summary = std::fs::read_to_string(folder.0.join(out).join("summary.json")).unwrap();
+        serde_json::from_str::<Value>(&summary).unwrap()["cost"]["mesh_vertices"].as_u64().unwrap()
+    };
+    run(&folder, &["--out", "kept"]);
+    assert_eq!(vertices("kept"), ((columns + 1) * (rows + 1)) as u64);
+    run(&folder, &["--set", "/tissue/outline/gmsh/keep_vertices=false", "--out", "anew"]);
+    assert_ne!(vertices("anew"), vertices("kept"));
+    // The manifest runs again without the file.
+    std::fs::remove_file(folder.0.join("tissue.msh")).unwrap();
+    let manifest = std::fs::read_to_string(folder.0.join("kept/manifest.json")).unwrap();
+    let manifest: Value = serde_json::from_str(&manifest).unwrap();
+    folder.write("again.json", &manifest["scenario"].to_string());
+    let again = tropism(&folder, &["again.json", "--out", "again"]);
+    assert_eq!(again.status.code(), Some(0), "{}", errors(&again));
+    let rows = |out: &str| std::fs::read(folder.0.join(out).join("trajectories.csv")).unwrap();
+    assert!(rows("kept") == rows("again"));
+    let refined = tropism(&folder, &["again.json", "--set", "/tissue/refinement={}"]);
+    assert!(
+        refined.status.code() == Some(2) && errors(&refined).contains("gives the vertices inside"),
+        "{}",
+        errors(&refined)
+    );
 }
 
 #[test]

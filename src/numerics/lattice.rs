@@ -5,16 +5,48 @@ use std::collections::HashMap;
 use crate::numerics::arrangement::Arrangement;
 use crate::numerics::mesh_grading::Grading;
 use crate::numerics::planar_domain::{Outline, PlanarDomain};
-use crate::numerics::polygon::{cross, minus, nearest_on_side, ring_contains, sides};
+use crate::numerics::polygon::{MERGE_TOLERANCE, cross, minus, nearest_on_side, ring_contains, sides};
 
 /// Distance that the lattice keeps from border and outlines, in units of the size: far enough that no sampled edge is
 /// encroached.
 const CLEARANCE: f64 = 0.6;
 
+/// Distance that given vertices keep from outlines of regions, in units of the size.
+const BESIDE_OUTLINES: f64 = 0.5;
+
+/// What fills a domain: the vertices that it gives, or a lattice. Outside there is a lattice in either case, where it is of use.
+pub(crate) fn filling(
+    domain: &PlanarDomain,
+    (constraints, outlines): (&Arrangement, &[Outline]),
+    size: f64,
+    grading: &Grading,
+) -> Vec<[f64; 2]> {
+    let mut points = lattice(domain, constraints, size, grading);
+    if !domain.vertices.is_empty() {
+        points.retain(|point| !domain.contains(*point));
+        points.extend(given(domain, outlines, size));
+    }
+    points
+}
+
+/// The vertices that a domain gives, but for those on its border and those too near to an outline for a good triangle between.
+fn given(domain: &PlanarDomain, outlines: &[Outline], size: f64) -> Vec<[f64; 2]> {
+    let border: Vec<_> = domain.rings().flat_map(|ring| sides(&ring.points)).collect();
+    let inner: Vec<_> = outlines.iter().flat_map(|outline| sides(&outline.points)).collect();
+    let clear = |lines: &[[[f64; 2]; 2]], point: [f64; 2], distance: f64| {
+        lines.iter().all(|&side| nearest_on_side(side, point).distance > distance)
+    };
+    let on_border = 10.0 * MERGE_TOLERANCE * domain.diameter();
+    let kept = |point: &[f64; 2]| {
+        domain.contains(*point) && clear(&border, *point, on_border) && clear(&inner, *point, BESIDE_OUTLINES * size)
+    };
+    domain.vertices.iter().copied().filter(kept).collect()
+}
+
 /// Points of an equilateral lattice that keep their distance from all constraints. Where the domain is not convex the
 /// lattice also fills a box around it, so that refinement finds nothing to mend outside. Where the grading asks for a level, the
 /// points of a lattice of half the spacing are added, which holds all points of the coarser one.
-pub(crate) fn lattice(domain: &PlanarDomain, constraints: &Arrangement, size: f64, grading: &Grading) -> Vec<[f64; 2]> {
+fn lattice(domain: &PlanarDomain, constraints: &Arrangement, size: f64, grading: &Grading) -> Vec<[f64; 2]> {
     let near = NearConstraints::new(constraints, size);
     let convex = is_convex(&domain.outer.points);
     let [mut low, mut high] = domain.bounding_box();

@@ -175,20 +175,22 @@ pub struct PlanarDomain {
     pub holes: Vec<Ring>,
     /// Names of the edges; several sides, also of several rings, may make one edge.
     pub edge_names: Vec<String>,
+    /// Points inside that a mesh shall have as vertices (µm): given any, it is filled by these. Those outside do no harm.
+    pub vertices: Vec<[f64; 2]>,
 }
 
 impl PlanarDomain {
     /// A domain from its rings, the outer turned counter-clockwise and holes clockwise. Call [`Self::check`] before use.
     pub fn new(outer: Ring, holes: Vec<Ring>, edge_names: Vec<String>) -> Self {
         let holes = holes.into_iter().map(|hole| hole.turned(false)).collect();
-        Self { outer: outer.turned(true), holes, edge_names }
+        Self { outer: outer.turned(true), holes, edge_names, vertices: Vec::new() }
     }
 
     /// The rectangle `(0, width) × (0, height)` with the edges `bottom`, `right`, `top`, `left` (0 to 3).
     pub fn rectangle(width: f64, height: f64) -> Self {
         let points = vec![[0.0, 0.0], [width, 0.0], [width, height], [0.0, height]];
         let edge_names = ["bottom", "right", "top", "left"].map(String::from).to_vec();
-        Self { outer: Ring { points, edges: vec![0, 1, 2, 3] }, holes: Vec::new(), edge_names }
+        Self { outer: Ring { points, edges: vec![0, 1, 2, 3] }, holes: Vec::new(), edge_names, vertices: Vec::new() }
     }
 
     /// Outer ring and holes, in this order.

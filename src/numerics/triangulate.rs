@@ -3,14 +3,15 @@
 //! Border and outlines are cut where they meet, sampled at the wanted size and kept as edges of a constrained Delaunay
 //! triangulation; an equilateral lattice fills the room between them; Delaunay refinement then mends angles only. So the
 //! mesh conforms to every outline (a region's area is the outline's, to round-off), is Delaunay, and has no obtuse angle
-//! facing a border or outline edge, which is what the discrete maximum principle asks of it.
+//! facing a border or outline edge, which is what the discrete maximum principle asks of it. A domain that gives vertices is filled
+//! by these instead of a lattice.
 //!
 //! Vertices and cells are numbered along a Morton curve: neighbours in the plane are neighbours in memory.
 
 use spade::{AngleLimit, ConstrainedDelaunayTriangulation, Point2, RefinementParameters, Triangulation};
 
 use crate::numerics::arrangement::Arrangement;
-use crate::numerics::lattice::lattice;
+use crate::numerics::lattice::filling;
 use crate::numerics::mesh_grading::Grading;
 use crate::numerics::planar_domain::{DomainError, Outline, PlanarDomain};
 use crate::numerics::polygon::{MERGE_TOLERANCE, bounding_box, cross, dot, minus, nearest_on_side, sides, signed_area};
@@ -135,7 +136,7 @@ pub fn triangulate_graded(
         .collect();
     let constraints = Arrangement::new(&segments, MERGE_TOLERANCE * domain.diameter())
         .sampled(options.size, |point| grading.size_at(point));
-    let (vertices, triangles) = refined_triangles(domain, &constraints, options, grading)?;
+    let (vertices, triangles) = refined_triangles(domain, (&constraints, outlines), options, grading)?;
     let (vertices, cells) = kept_and_renumbered(domain, &vertices, &triangles);
     let mut mesh = SimplexMesh::new(vertices, cells)?;
     mesh.name_border(|midpoint| domain.edge_at(midpoint));
@@ -213,7 +214,7 @@ type Cdt = ConstrainedDelaunayTriangulation<Point2<f64>>;
 
 fn refined_triangles(
     domain: &PlanarDomain,
-    constraints: &Arrangement,
+    (constraints, outlines): (&Arrangement, &[Outline]),
     options: &MeshOptions,
     grading: &Grading,
 ) -> Result<Soup, TriangulationError> {
@@ -224,7 +225,7 @@ fn refined_triangles(
         return Err(too_many);
     }
     let mut points = constraints.points.clone();
-    points.extend(lattice(domain, constraints, options.size, grading));
+    points.extend(filling(domain, (constraints, outlines), options.size, grading));
     points.extend(frame(domain));
     if points.len() > options.max_vertices {
         return Err(too_many);
@@ -357,6 +358,31 @@ mod tests {
 
     fn total_area(fitted: &FittedMesh) -> f64 {
         (0..fitted.mesh.cell_count()).map(|c| fitted.mesh.volume(fitted.mesh.vertices(), c)).sum()
+    }
+
+    #[test]
+    fn a_domain_that_gives_vertices_is_filled_by_these_alone() {
+        // A domain that is not convex, meshed once; its vertices then come back, also those of the border.
+        let points = vec![[0.0, 0.0], [3.0, 0.0], [3.0, 2.0], [1.5, 1.2], [0.0, 2.0]];
+        let domain = PlanarDomain::new(Ring { points, edges: vec![0; 5] }, Vec::new(), vec!["side".into()]);
+        let first = triangulate(&domain, &[], &MeshOptions::of_size(0.2)).unwrap().mesh;
+        let mut on_border = vec![false; first.vertex_count()];
+        first.border().iter().for_each(|facet| first.facet_vertices(*facet).for_each(|v| on_border[v as usize] = true));
+        let inside = first.vertices().iter().zip(&on_border).filter(|(_, border)| !**border).map(|(x, _)| *x);
+        // Points outside, on the border and in the way of an outline do no harm.
+        let vertices: Vec<_> = inside.chain([[9.0, 9.0], [1.0, 0.0], [1.5, 1.9]]).collect();
+        let again = PlanarDomain { vertices, ..domain.clone() };
+        let second = triangulate(&again, &[], &MeshOptions::of_size(0.2)).unwrap().mesh;
+        let sorted = |mesh: &SimplexMesh<2>| {
+            let mut vertices = mesh.vertices().to_vec();
+            vertices.sort_by(|a, b| a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1])));
+            vertices
+        };
+        assert_eq!((sorted(&first), first.cell_count()), (sorted(&second), second.cell_count()));
+        let disc = Outline::disc([0.8, 0.8], 0.3, 0.2);
+        let fitted = triangulate(&again, std::slice::from_ref(&disc), &MeshOptions::of_size(0.2)).unwrap();
+        let area = region_area(&fitted, 0);
+        assert!((area - disc.area()).abs() < 1e-12 && fitted.min_angle > 0.4, "{area} {}", fitted.min_angle);
     }
 
     #[test]

@@ -77,7 +77,7 @@ impl Scene {
 }
 
 fn check_tissue(tissue: &Tissue, violations: &mut Violations) {
-    if let Outline::Polygon { outer, holes } = &tissue.outline {
+    if let Outline::Polygon { outer, holes, vertices } = &tissue.outline {
         let mut found = Violations::new();
         check_named_ring(outer, "/tissue/outline/polygon/outer", &mut found);
         let border = outer.coordinates();
@@ -92,6 +92,9 @@ fn check_tissue(tissue: &Tissue, violations: &mut Violations) {
         if !found.is_empty() {
             return violations.extend_under("", found);
         }
+        violations.demand(vertices.is_empty() || tissue.refinement.is_none(), "/tissue/refinement", || {
+            "the outline gives the vertices inside; leave out one of both".to_owned()
+        });
     }
     let vertices = VERTICES_PER_SQUARE * tissue.outline.area() / tissue.mesh_size.0.powi(2);
     violations.demand(vertices <= tissue.max_vertices as f64, "/tissue/mesh_size", || {

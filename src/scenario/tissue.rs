@@ -78,6 +78,10 @@ pub enum Outline {
         /// The borders of the holes.
         #[serde(default)]
         holes: Vec<Ring>,
+        /// Points inside that the mesh shall have as vertices: given any, it is filled by these, and `mesh_size` bounds the sides along border,
+        /// sources and targets alone.
+        #[serde(default)]
+        vertices: Vec<Point>,
     },
 }
 
@@ -105,6 +109,14 @@ impl Outline {
         match self {
             Self::Rectangle { .. } => Vec::new(),
             Self::Polygon { holes, .. } => holes.iter().map(|hole| hole.named("hole")).collect(),
+        }
+    }
+
+    /// The vertices given for the inside \[µm\].
+    pub fn vertices(&self) -> Vec<[f64; 2]> {
+        match self {
+            Self::Rectangle { .. } => Vec::new(),
+            Self::Polygon { vertices, .. } => coordinates(vertices),
         }
     }
 

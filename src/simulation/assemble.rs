@@ -235,7 +235,8 @@ fn domain(outline: &scene::Outline) -> PlanarDomain {
         let index = |name: &String| names.iter().position(|other| other == name).unwrap_or_default() as u16;
         Ring { points: ring.coordinates(), edges: ring.edges.iter().map(index).collect() }
     };
-    PlanarDomain::new(ring(&outline.outer()), outline.holes().iter().map(ring).collect(), names.clone())
+    let holes = outline.holes().iter().map(ring).collect();
+    PlanarDomain { vertices: outline.vertices(), ..PlanarDomain::new(ring(&outline.outer()), holes, names.clone()) }
 }
 
 fn outline(shape: &Shape, grading: &Grading) -> Outline {

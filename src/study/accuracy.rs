@@ -109,10 +109,9 @@ pub fn find(laboratory: &Laboratory) -> Result<Option<Found>, RunError> {
     let scene = laboratory.scene()?;
     let Some(asked) = scene.scene.accuracy.map(|accuracy| accuracy.0) else { return Ok(None) };
     let step_given = given(&scene, "/time/step");
-    let mesh_given = given(&scene, "/tissue/mesh_size");
+    let mesh_given = given(&scene, "/tissue/mesh_size") || !scene.scene.tissue.outline.vertices().is_empty();
     if step_given && mesh_given {
-        let message =
-            "nothing is left to choose: the scene gives /time/step and /tissue/mesh_size; leave one of them out";
+        let message = "nothing is left to choose: the scene gives /time/step and /tissue/mesh_size (or the vertices inside); leave one of them out";
         let problems = vec![Violation::new("/accuracy", message)];
         return Err(RunError::Scenario(ScenarioErrors { path: laboratory.request.path.clone(), problems }));
     }

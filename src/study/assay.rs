@@ -10,7 +10,6 @@ use crate::record::plot::{Axis, Level, Plot, Series, Stroke};
 use crate::record::recording::Recording;
 use crate::record::snapshot::Snapshot;
 use crate::record::statistics::{mean, standard_deviation};
-use std::collections::BTreeMap;
 
 /// Points of the mean path.
 const MEAN_POINTS: usize = 40;
@@ -31,14 +30,17 @@ pub struct Assay {
 }
 
 impl Assay {
-    /// The axons that are there at a time (h) of a recording, by the gradient of one cue: the one named, or the first.
-    pub fn of(recording: &Recording, time: f64, cue: Option<&str>) -> Self {
+    /// The axons that are there at a time (h) of a recording, by the gradient of one cue: the one named, or the first; none if the
+    /// recording has no first headings.
+    pub fn of(recording: &Recording, time: f64, cue: Option<&str>) -> Option<Self> {
+        let headings = recording.axon_heading.as_ref()?;
         let snapshot = recording.snapshot(time);
-        let headings = first_headings(recording, time);
         let field = snapshot.fields.iter().find(|field| cue.is_none_or(|name| field.name == name));
         let (mut paths, mut angles, mut leans) = (Vec::new(), Vec::new(), Vec::new());
         for (tip, shaft) in snapshot.tips.iter().zip(&snapshot.shafts).filter(|(tip, _)| !tip.is_branch) {
-            let (Some(&heading), Some(&start)) = (headings.get(&tip.axon), shaft.first()) else { continue };
+            let (Some(&heading), Some(&start)) = (headings.get(tip.axon as usize), shaft.first()) else { continue };
+            let (sine, cosine) = f64::from(heading).sin_cos();
+            let heading = [cosine, sine];
             let slope = field.and_then(|field| gradient(&snapshot, &field.concentration, start));
             let lean = slope.and_then(|slope| signed_angle(heading, slope));
             // Angles are counter-clockwise, the figure's to the right.
@@ -49,7 +51,7 @@ impl Assay {
             paths.push(shaft.iter().map(|x| upright([x[0] - start[0], x[1] - start[1]], heading, side)).collect());
         }
         let gradient = mean(&leans).zip(field).map(|(lean, field)| (lean, field.name.clone()));
-        Self { paths, angles, gradient }
+        Some(Self { paths, angles, gradient })
     }
 
     /// Mean turning angle and its standard error (degrees); none without an axon.
@@ -152,17 +154,6 @@ impl Assay {
 fn upright([x, y]: [f64; 2], heading: [f64; 2], side: f64) -> [f64; 2] {
     let [along, left] = [x * heading[0] + y * heading[1], y * heading[0] - x * heading[1]];
     [side * left, along]
-}
-
-/// The heading of each axon at the first frame that it is seen at, up to a time (h).
-fn first_headings(recording: &Recording, time: f64) -> BTreeMap<u32, [f64; 2]> {
-    let mut headings = BTreeMap::new();
-    for &frame in recording.header.frames.iter().take_while(|frame| **frame <= time) {
-        for tip in recording.snapshot(frame).tips {
-            headings.entry(tip.axon).or_insert(tip.heading);
-        }
-    }
-    headings
 }
 
 /// The gradient (nM/µm) of a linear field in the triangle that a point lies in; none outside, or where there is none.

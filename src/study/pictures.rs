@@ -130,7 +130,10 @@ impl FigureOfRuns {
         let time = self.times.first().copied().unwrap_or(run.recording.span().1);
         // What the panel refuses is refused here too.
         self.panel(run, String::new(), time)?;
-        let assay = Assay::of(&run.recording, time, self.cues.first().map(String::as_str));
+        let Some(assay) = Assay::of(&run.recording, time, self.cues.first().map(String::as_str)) else {
+            let message = format!("{} has no first headings in its recording: run it again", run.folder.display());
+            return Err(RunError::Arguments(message));
+        };
         let subtitle = format!("{}; {}", run.recording.header.description, time_label(time).replace(' ', "\u{a0}"));
         plot::draw(&run.recording.header.scene, &subtitle, &assay.plots()).map_err(refused)
     }

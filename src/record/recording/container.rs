@@ -55,6 +55,9 @@ impl Recording {
         payload.add("tip_status", &[frames, axons], Items::Bytes(&self.tip_status));
         payload.add("axon_population", &[axons], Items::Shorts(&self.axon_population));
         payload.add("axon_birth", &[axons], Items::Floats(&self.axon_birth));
+        if let Some(headings) = &self.axon_heading {
+            payload.add("axon_heading", &[axons], Items::Floats(headings));
+        }
         payload.add("axon_parent", &[axons], Items::Words(&self.axon_parent));
         let stored = self.shaft_cell.len();
         payload.add("shaft_start", &[axons + 1], Items::Words(&self.shaft_start));
@@ -87,6 +90,8 @@ impl Recording {
             arrays.shorts(&format!("cue_{index}"), &[cue.frames.len(), vertex_count])
         };
         let ends = places.contains_key("shaft_end").then(|| arrays.shorts("shaft_end", &[stored])).transpose()?;
+        let headings =
+            places.contains_key("axon_heading").then(|| arrays.floats("axon_heading", &[axons])).transpose()?;
         let recording = Self {
             vertex_count,
             cells: arrays.words("cells", &[cell_count, 3])?,
@@ -97,6 +102,7 @@ impl Recording {
             tip_status: arrays.bytes("tip_status", "u8", &[frames, axons], 1)?.to_vec(),
             axon_population: arrays.shorts("axon_population", &[axons])?,
             axon_birth: arrays.floats("axon_birth", &[axons])?,
+            axon_heading: headings,
             axon_parent: arrays.words("axon_parent", &[axons])?,
             shaft_start: arrays.words("shaft_start", &[axons.saturating_add(1)])?,
             shaft_cell: arrays.words("shaft_cell", &[stored])?,

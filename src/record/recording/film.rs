@@ -7,7 +7,7 @@ use super::shaft_history::ShaftHistory;
 use super::{FULL, Header, NO_PARENT, RecordedBorder, RecordedCue, RecordedTarget, Recording, STAYS, VERSION};
 use crate::kept;
 use crate::model::clock::Clock;
-use crate::model::components::{GrowthCone, Status};
+use crate::model::components::{GrowthCone, Journey, Status};
 use crate::model::growth::Populations;
 use crate::model::observables::{Effect, Observables};
 use crate::model::remodel::SpareCones;
@@ -190,6 +190,7 @@ impl Film {
             tip_status: self.tips.iter().flatten().map(|tip| tip.status).collect(),
             axon_population: cones.iter().map(|cone| cone.population).collect(),
             axon_birth: cones.iter().map(|cone| cone.birth_time as f32).collect(),
+            axon_heading: Some(first_headings(world)),
             axon_parent: cones.iter().map(|cone| spares.parent(cone.axon).unwrap_or(NO_PARENT)).collect(),
             shaft_start,
             shaft_cell: seen.iter().map(|vertex| vertex.cell).collect(),
@@ -292,6 +293,12 @@ pub(super) fn quantised_time(time: f64, last: f64) -> u16 {
 /// A share in [0, 1] in steps of 1/65535; 0 for what is none.
 fn share(share: f64) -> u16 {
     (FULL * share).round() as u16
+}
+
+/// Headings at birth (rad), in the order of the cones; 0 for those not born.
+fn first_headings(world: &World) -> Vec<f32> {
+    let Some(mut journeys) = world.try_query_filtered::<&Journey, With<GrowthCone>>() else { return Vec::new() };
+    journeys.iter(world).map(|journey| journey.first_heading[1].atan2(journey.first_heading[0]) as f32).collect()
 }
 
 /// All growth cones in the order of their numbers.

@@ -133,6 +133,8 @@ pub struct Recording {
     pub axon_population: Vec<u16>,
     /// When each axon is born (h).
     pub axon_birth: Vec<f32>,
+    /// Heading of each axon at its birth, counter-clockwise from +x (rad); none in recordings of version 0.1.0 before this array came.
+    pub axon_heading: Option<Vec<f32>>,
     /// The axon that a branch sprouted from, or [`NO_PARENT`].
     pub axon_parent: Vec<u32>,
     /// Where each shaft's vertices begin; one more entry than axons.

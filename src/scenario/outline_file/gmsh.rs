@@ -1,8 +1,8 @@
-//! Gmsh MSH 2.2 and 4.1 in ASCII: triangles in a plane of constant z; physical lines name what they cover. What is taken is the border:
-//! sides that belong to one triangle, joined to rings.
+//! Gmsh MSH 2.2 and 4.1 in ASCII: triangles in a plane of constant z; physical lines name what they cover. What is taken is the border,
+//! sides that belong to one triangle, joined to rings, and the nodes of triangles that are not on it.
 
 use super::{Found, FoundRing};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::str::FromStr;
 
 const LINE: usize = 1;
@@ -221,6 +221,7 @@ impl Mesh {
                 return Err(format!("two borders meet at node {a}"));
             }
         }
+        let on_border: BTreeSet<usize> = next.keys().copied().collect();
         let mut found = Found::default();
         while let Some((&start, _)) = next.first_key_value() {
             let (mut ring, mut at) = (FoundRing::default(), start);
@@ -232,6 +233,13 @@ impl Mesh {
                 at = to;
             }
             found.rings.push(ring);
+        }
+        let mut inside: Vec<usize> = self.triangles.iter().flatten().copied().collect();
+        inside.sort_unstable();
+        inside.dedup();
+        for node in inside.into_iter().filter(|node| !on_border.contains(node)) {
+            let [x, y, _] = self.place(node)?;
+            found.inside.push([x, y]);
         }
         Ok(found)
     }

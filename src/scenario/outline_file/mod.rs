@@ -19,6 +19,8 @@ use std::path::{Component, Path, PathBuf};
 
 /// Points of an outline from a file, with those of the lines that name its sides.
 const MOST_POINTS: usize = 20_000;
+/// Vertices inside a mesh from a file.
+const MOST_VERTICES: usize = 200_000;
 
 keys! {
     /// A file with an outline in it.
@@ -32,6 +34,17 @@ keys! {
         #[schemars(extend("exclusiveMinimum" = 0.0))]
         pub tolerance: Length = Length(0.5),
     }
+
+    /// A file with a mesh in it.
+    pub struct MeshFile {
+        /// The file, relative to the scenario and inside its folder.
+        pub file: String = String::new(),
+        /// How long one unit of the file is.
+        #[schemars(extend("exclusiveMinimum" = 0.0))]
+        pub scale: Length = Length(1.0),
+        /// Whether the vertices inside are kept, as `polygon.vertices`; otherwise the inside is meshed anew with `mesh_size`.
+        pub keep_vertices: bool = false,
+    }
 }
 
 /// An outline in a file, by the file's format.
@@ -42,15 +55,26 @@ pub enum FiledOutline {
     Geojson(OutlineFile),
     /// Closed shapes of an SVG drawing, y upward from its lower edge; open lines along them name the sides by their `id`.
     Svg(OutlineFile),
-    /// The border of a Gmsh mesh of triangles, MSH 2.2 or 4.1 in ASCII; physical lines name its sides. The inside is meshed anew.
-    Gmsh(OutlineFile),
+    /// A Gmsh mesh of triangles, MSH 2.2 or 4.1 in ASCII; physical lines name the sides of its border.
+    Gmsh(MeshFile),
 }
 
-/// Closed lines with names of their sides, and open lines that name sides, in units of the file.
+impl FiledOutline {
+    /// The file, and how long one of its units is (µm).
+    fn file_and_scale(&self) -> (&str, f64) {
+        match self {
+            Self::Geojson(keys) | Self::Svg(keys) => (&keys.file, keys.scale.0),
+            Self::Gmsh(keys) => (&keys.file, keys.scale.0),
+        }
+    }
+}
+
+/// Closed lines with names of their sides, open lines that name sides, and vertices of a mesh inside, in units of the file.
 #[derive(Debug, Clone, PartialEq, Default)]
 struct Found {
     rings: Vec<FoundRing>,
     lines: Vec<(String, Vec<[f64; 2]>)>,
+    inside: Vec<[f64; 2]>,
 }
 
 /// A closed line; a side has the number of its first point.
@@ -72,9 +96,9 @@ pub fn take_in(document: &mut Value, folder: &Path) -> Result<(), Violation> {
     }
     let at = |key: &str, message: String| Violation::new(format!("/tissue/outline/{format}{key}"), message);
     let filed: FiledOutline = serde_json::from_value(outline.clone()).map_err(|error| at("", error.to_string()))?;
-    let (FiledOutline::Geojson(keys) | FiledOutline::Svg(keys) | FiledOutline::Gmsh(keys)) = &filed;
-    let text = read_inside(folder, &keys.file).map_err(|message| at("/file", message))?;
-    *outline = polygon(&filed, &text).map_err(|message| at("/file", format!("{}: {message}", keys.file)))?;
+    let (file, _) = filed.file_and_scale();
+    let text = read_inside(folder, file).map_err(|message| at("/file", message))?;
+    *outline = polygon(&filed, &text).map_err(|message| at("/file", format!("{file}: {message}")))?;
     Ok(())
 }
 
@@ -83,8 +107,8 @@ pub fn take_in(document: &mut Value, folder: &Path) -> Result<(), Violation> {
 /// # Errors
 /// What is wrong in the text, and where.
 pub fn polygon(filed: &FiledOutline, text: &str) -> Result<Value, String> {
-    let (FiledOutline::Geojson(keys) | FiledOutline::Svg(keys) | FiledOutline::Gmsh(keys)) = filed;
-    let found = match filed {
+    let (_, scale) = filed.file_and_scale();
+    let mut found = match filed {
         FiledOutline::Geojson(_) => geojson::read(text),
         FiledOutline::Svg(keys) => svg::read(text, keys.tolerance.0 / keys.scale.0),
         FiledOutline::Gmsh(_) => gmsh::read(text),
@@ -94,16 +118,25 @@ pub fn polygon(filed: &FiledOutline, text: &str) -> Result<Value, String> {
     if count > MOST_POINTS {
         return Err(format!("{count} points; at most {MOST_POINTS} are taken"));
     }
+    let inside = std::mem::take(&mut found.inside);
+    if inside.len() > MOST_VERTICES {
+        return Err(format!("{} vertices inside; at most {MOST_VERTICES} are taken", inside.len()));
+    }
     let rings = naming::named(found)?;
+    let scaled = |points: &[[f64; 2]]| -> Vec<_> { points.iter().map(|point| point.map(|x| x * scale)).collect() };
     let written = |(place, ring): (usize, &FoundRing)| {
-        let points: Vec<_> = ring.points.iter().map(|point| point.map(|x| x * keys.scale.0)).collect();
+        let points = scaled(&ring.points);
         let default = if place == 0 { "outer" } else { "hole" };
         let edges: Vec<_> = ring.names.iter().map(|name| name.as_deref().unwrap_or(default)).collect();
         json!({ "points": points, "edges": edges })
     };
     let mut written: Vec<Value> = rings.iter().enumerate().map(written).collect();
     let outer = written.remove(0);
-    Ok(json!({ "polygon": { "outer": outer, "holes": written } }))
+    let mut polygon = json!({ "outer": outer, "holes": written });
+    if matches!(filed, FiledOutline::Gmsh(keys) if keys.keep_vertices) {
+        polygon["vertices"] = json!(scaled(&inside));
+    }
+    Ok(json!({ "polygon": polygon }))
 }
 
 /// The text of a file inside a folder.

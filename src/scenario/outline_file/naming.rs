@@ -8,7 +8,7 @@ const REACH: f64 = 1e-5;
 
 /// The rings, the outer one first, with the names that lines give their sides.
 pub(super) fn named(found: Found) -> Result<Vec<FoundRing>, String> {
-    let Found { mut rings, lines } = found;
+    let Found { mut rings, lines, .. } = found;
     rings.iter_mut().for_each(tidy);
     if let Some(ring) = rings.iter().find(|ring| ring.points.len() < 3) {
         return Err(format!("a closed line of {} points encloses nothing", ring.points.len()));
@@ -84,7 +84,7 @@ mod tests {
         let hole = ring(&[[1.0, 1.0], [2.0, 1.0], [2.0, 2.0]]);
         let lines =
             vec![("top".to_owned(), vec![[5.0, 4.0], [0.0, 4.0]]), ("slit".to_owned(), vec![[2.0, 1.0], [2.0, 2.0]])];
-        let rings = named(Found { rings: vec![hole, square], lines }).unwrap();
+        let rings = named(Found { rings: vec![hole, square], lines, ..Found::default() }).unwrap();
         assert_eq!(rings[0].points, [[0.0, 0.0], [4.0, 0.0], [4.0, 4.0], [0.0, 4.0]]);
         assert_eq!(rings[0].names, [None, None, Some("top".to_owned()), None]);
         assert_eq!(rings[1].names, [None, Some("slit".to_owned()), None]);
@@ -93,7 +93,7 @@ mod tests {
     #[test]
     fn what_is_no_outline_is_refused() {
         let square = |x: f64| ring(&[[x, 0.0], [x + 1.0, 0.0], [x + 1.0, 1.0], [x, 1.0]]);
-        let refusal = |rings: Vec<FoundRing>, lines| named(Found { rings, lines }).unwrap_err();
+        let refusal = |rings: Vec<FoundRing>, lines| named(Found { rings, lines, ..Found::default() }).unwrap_err();
         assert!(refusal(vec![], vec![]).contains("no closed line"));
         assert!(refusal(vec![square(0.0), square(3.0)], vec![]).contains("beside each other"));
         assert!(refusal(vec![ring(&[[0.0, 0.0], [1.0, 0.0]])], vec![]).contains("encloses nothing"));

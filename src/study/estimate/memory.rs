@@ -31,12 +31,17 @@ pub fn estimate(world: &World, expected: &Expectation, scale: f64) -> Result<Est
     estimate.add("program", PROGRAM);
     estimate.add("mesh", SETTING_UP * tissue.mesh.vertex_count() as f64);
     estimate.add("trajectories", ROW * expected.trajectory_points);
-    // As it is filmed, and once more as it is written.
-    estimate.add("recording", 2.0 * expected.recording_bytes);
+    estimate.add("recording", expected.recording_bytes);
+    let mut drawing = 0.0;
     if expected.pictures > 0 {
         let [low, high] = tissue.domain.bounding_box();
-        let drawing = bytes_to_draw(expected.pictures, [high[0] - low[0], high[1] - low[1]], scale)?;
-        estimate.add("figure", drawing + DRAWN_VERTEX * expected.drawn_vertices);
+        drawing = bytes_to_draw(expected.pictures, [high[0] - low[0], high[1] - low[1]], scale)?;
+        drawing += DRAWN_VERTEX * expected.drawn_vertices;
+    }
+    // The recording as it is written is a second copy, which has gone when the figure is drawn: the larger of both counts.
+    match drawing >= expected.recording_bytes {
+        true => estimate.add("figure", drawing),
+        false => estimate.add("recording", expected.recording_bytes),
     }
     estimate.parts.iter_mut().for_each(|part| part.amount /= MEGABYTE);
     Ok(estimate.summed())

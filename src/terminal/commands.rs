@@ -43,16 +43,18 @@ pub fn run_plan(scene: &SceneArguments, json: bool, roster: &Roster) -> Result<E
     Ok(ExitCode::SUCCESS)
 }
 
-/// Lets a scene through of which as many runs fit as threads would have at once, of `count` in all.
+/// Lets a scene through of which as many runs fit as threads would have at once, of `count` in all; also one that cannot be assembled, so
+/// that its runs tell why.
 ///
 /// # Errors
-/// A scene that cannot be assembled, or so many of which do not fit.
+/// A scene so many runs of which do not fit.
 fn admit_many(scene: &SceneArguments, loaded: &Loaded, roster: &Roster, count: u64) -> Result<(), RunError> {
     if scene.memory == Room::Any {
         return Ok(());
     }
     let at_once = (rayon::current_num_threads() as u64).min(count) as usize;
-    scene.memory.admit(&loaded.scene.name, &plan(loaded, roster, &scene.path())?.memory_mb, at_once)
+    let Ok(planned) = plan(loaded, roster, &scene.path()) else { return Ok(()) };
+    scene.memory.admit(&loaded.scene.name, &planned.memory_mb, at_once)
 }
 
 /// Prints a value as JSON.

@@ -102,7 +102,8 @@ impl Recording {
             tip_status: arrays.bytes("tip_status", "u8", &[frames, axons], 1)?.to_vec(),
             axon_population: arrays.shorts("axon_population", &[axons])?,
             axon_birth: arrays.floats("axon_birth", &[axons])?,
-            axon_heading: headings,
+            axon_heading: (places.contains_key("axon_heading").then(|| arrays.floats("axon_heading", &[axons])))
+                .transpose()?,
             axon_parent: arrays.words("axon_parent", &[axons])?,
             shaft_start: arrays.words("shaft_start", &[axons.saturating_add(1)])?,
             shaft_cell: arrays.words("shaft_cell", &[stored])?,

@@ -90,8 +90,6 @@ impl Recording {
             arrays.shorts(&format!("cue_{index}"), &[cue.frames.len(), vertex_count])
         };
         let ends = places.contains_key("shaft_end").then(|| arrays.shorts("shaft_end", &[stored])).transpose()?;
-        let headings =
-            places.contains_key("axon_heading").then(|| arrays.floats("axon_heading", &[axons])).transpose()?;
         let recording = Self {
             vertex_count,
             cells: arrays.words("cells", &[cell_count, 3])?,

@@ -2,7 +2,7 @@
 //!
 //! The program runs itself under callgrind, which counts the instructions of N steps of a small scene after N others, on one thread, and
 //! nothing of what happens before. Twice so: with the roster that comes with the program, and with one that has the scene's mechanisms
-//! only. Off is absence, so both must agree: within 0.1 %, or the program ends with 1. Then a table: one mechanism after the other joins
+//! only. Off is absence, so both must agree, the least of a few counts each: within 0.1 %, or the program ends with 1. Then a table: one mechanism after the other joins
 //! the scene. What the largest scene takes may not exceed the number stored in `instructions.json` by more than 3 %; where it is less by
 //! as much, the number is to be stored anew (`-- --store`).
 
@@ -17,6 +17,9 @@ use tropism::systems;
 const STEPS: usize = 30;
 /// Largest difference of the two rosters, as a share.
 const ALLOWED: f64 = 1e-3;
+/// How often both are counted again where they differ by more: addresses and hashes are drawn anew in each process and move a count by
+/// up to 0.3 %, so that the least of several is what counts.
+const COUNTS: usize = 6;
 /// Growth over the stored number that is allowed, as a share.
 const GROWTH: f64 = 0.03;
 /// Where the number is stored.
@@ -167,7 +170,13 @@ fn report() -> Result<(bool, f64), String> {
     println!("{:>12} {:>12} {:>10}   mechanisms of the scene", "own roster", "whole roster", "difference");
     let mut equal = true;
     for number in [0, 2, 6] {
-        let (own, whole) = (per_cone_step("own", number)?, per_cone_step("whole", number)?);
+        let (mut own, mut whole) = (f64::INFINITY, f64::INFINITY);
+        for _ in 0..COUNTS {
+            (own, whole) = (own.min(per_cone_step("own", number)?), whole.min(per_cone_step("whole", number)?));
+            if (whole / own - 1.0).abs() <= ALLOWED {
+                break;
+            }
+        }
         let difference = whole / own - 1.0;
         equal &= difference.abs() <= ALLOWED;
         let names: Vec<&str> = blocks().into_iter().take(number).map(|(name, _)| name).collect();

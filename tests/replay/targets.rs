@@ -92,10 +92,9 @@ pub fn units(bytes: &[u8]) {
     }
 }
 
-/// An outline in a file of another program: taken in, and meshed coarsely.
-fn outline(format: &str, bytes: &[u8]) {
-    let keys = json!({ (format): { "file": "fuzzed", "tolerance": "1 um" } });
-    let Ok(filed) = serde_json::from_value(keys) else { unreachable!("{format} is a format") };
+/// An outline in a file of another program, with the keys that its format takes: taken in, and meshed coarsely.
+fn outline(keys: Value, bytes: &[u8]) {
+    let Ok(filed) = serde_json::from_value(keys) else { unreachable!("the keys of a format") };
     let Ok(polygon) = outline_file::polygon(&filed, &String::from_utf8_lossy(bytes)) else { return };
     let points = polygon["polygon"]["outer"]["points"].as_array().into_iter().flatten();
     let reach =
@@ -111,17 +110,17 @@ fn outline(format: &str, bytes: &[u8]) {
 
 /// An outline in GeoJSON.
 pub fn geojson(bytes: &[u8]) {
-    outline("geojson", bytes);
+    outline(json!({ "geojson": { "file": "fuzzed" } }), bytes);
 }
 
 /// An outline in SVG.
 pub fn svg(bytes: &[u8]) {
-    outline("svg", bytes);
+    outline(json!({ "svg": { "file": "fuzzed", "tolerance": "1 um" } }), bytes);
 }
 
-/// The border of a Gmsh mesh.
+/// A Gmsh mesh with its vertices.
 pub fn gmsh(bytes: &[u8]) {
-    outline("gmsh", bytes);
+    outline(json!({ "gmsh": { "file": "fuzzed", "keep_vertices": true } }), bytes);
 }
 
 /// A checkpoint, as it is and with the length and the checksum that its body asks for: what is read is written as the same bytes, and a

@@ -31,7 +31,7 @@ fn arms_of(scene: &Value, roster: &Roster, seeds: u64, pairs: bool) -> Ablation 
 }
 
 fn of_loaded(loaded: &Loaded, roster: &Roster, extent: Extent) -> Ablation {
-    ablate(loaded, roster, "scene.json".as_ref(), extent, |_| {}).unwrap_or_else(|error| panic!("{error}"))
+    ablate(loaded, roster, "scene.json".as_ref(), extent, (|_| {}, || None)).unwrap_or_else(|error| panic!("{error}"))
 }
 
 fn arm<'a>(ablation: &'a Ablation, name: &str) -> &'a Arm {

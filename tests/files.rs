@@ -267,6 +267,53 @@ fn a_mesh_of_gmsh_gives_border_names_and_if_asked_for_its_vertices() {
 }
 
 #[test]
+fn a_scene_puts_another_outline_in_the_place_of_its_base_and_a_file_without_end_is_refused() {
+    let folder = with_scene(&scene());
+    folder.write("tissue.msh", &gmsh(6, 4));
+    let from_base = |tissue: Value, edge: &str| {
+        let motion = json!({ "motion": { (edge): { "outward": 0.1 }, "top": null, "bottom": null } });
+        let axons = json!({ "axons": { "origin": { "edge": edge } } });
+        json!({ "base": "scene.json", "tissue": { "outline": tissue }, "populations": axons, "matrix": motion })
+    };
+    let filed = from_base(json!({ "rectangle": null, "gmsh": { "file": "tissue.msh" } }), "floor");
+    folder.write("filed.json", &filed.to_string());
+    folder.write(
+        "back.json",
+        &json!({
+            "base": "filed.json",
+            "tissue": { "outline": { "gmsh": null, "rectangle": { "width": 250, "height": 150 } } },
+            "populations": { "axons": { "origin": { "edge": "bottom" } } },
+            "matrix": { "motion": { "floor": null, "bottom": { "outward": 0.1 } } }
+        })
+        .to_string(),
+    );
+    for scene in ["filed.json", "back.json"] {
+        let output = tropism(&folder, &[scene]);
+        assert_eq!(output.status.code(), Some(0), "{scene}: {}", errors(&output));
+    }
+    let both = from_base(json!({ "gmsh": { "file": "tissue.msh" } }), "floor");
+    folder.write("both.json", &both.to_string());
+    let refused = tropism(&folder, &["both.json"]);
+    assert!(
+        refused.status.code() == Some(2) && errors(&refused).contains("only one of rectangle, gmsh"),
+        "{}",
+        errors(&refused)
+    );
+    #[cfg(unix)]
+    {
+        assert!(Command::new("mkfifo").arg(folder.0.join("pipe.msh")).status().unwrap().success());
+        let pipe = from_base(json!({ "rectangle": null, "gmsh": { "file": "pipe.msh" } }), "floor");
+        folder.write("pipe.json", &pipe.to_string());
+        let refused = tropism(&folder, &["pipe.json"]);
+        assert!(
+            refused.status.code() == Some(2) && errors(&refused).contains("pipe.msh: no file"),
+            "{}",
+            errors(&refused)
+        );
+    }
+}
+
+#[test]
 fn quiet_says_nothing_and_verbose_says_the_phases() {
     let folder = with_scene(&scene());
     let output = run(&folder, &["--quiet"]);

@@ -220,7 +220,10 @@ fn a_run_without_checkpoints_can_be_stopped_and_resumed_too_and_seeds_end_clean(
     long["time"] = json!({ "duration": 1000, "step": "0.05 min" });
     long["populations"]["axons"]["births"] = json!({ "uniform": { "from": 0, "to": 900 } });
     folder.write("scene.json", &long.to_string());
-    for arguments in [&["scene.json", "--out", "plain"][..], &["scene.json", "--out", "plain", "--seeds", "500"]] {
+    let ablation = ["ablate", "scene.json", "--out", "ablation", "--seeds", "2"];
+    for arguments in
+        [&["scene.json", "--out", "plain"][..], &["scene.json", "--out", "plain", "--seeds", "500"], &ablation]
+    {
         // Signals are caught from the first step on: one that comes earlier ends the program as it ends any.
         let interrupted = [300, 1000, 3000, 10_000, 30_000].into_iter().map(|delay| {
             let mut child = tropism(&folder.0, arguments).stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
@@ -234,6 +237,10 @@ fn a_run_without_checkpoints_can_be_stopped_and_resumed_too_and_seeds_end_clean(
         assert!(said.contains("stopped by SIGINT"), "{said}");
         if arguments.len() == 3 {
             assert!(demand_whole(&folder.0.join("plain")), "a checkpoint to go on from");
+        }
+        if arguments[0] == "ablate" {
+            let table = std::fs::read(folder.0.join("ablation/ablation.json")).unwrap();
+            assert_eq!(serde_json::from_slice::<Value>(&table).unwrap()["complete"], json!(false));
         }
     }
 }

@@ -19,6 +19,8 @@ impl Walker<'_> {
         if !value.is_null() {
             open.retain(|branch| !types_of(branch).eq(["null"]));
         }
+        let left = without_removed(&open, value);
+        let value = left.as_ref().unwrap_or(value);
         if let [only] = open.as_slice() {
             return self.check(only, value, pointer);
         }
@@ -42,6 +44,17 @@ impl Walker<'_> {
             None => self.problem(pointer, refuse(self.root, &open, value)),
         }
     }
+}
+
+/// An object without the variants that it removes, as `{"rectangle": null, "svg": {…}}` does with the variant of a base scene; none if it
+/// removes none, or all.
+fn without_removed(branches: &[Cow<Value>], value: &Value) -> Option<Value> {
+    let object = value.as_object()?;
+    let tags: Vec<&str> = branches.iter().filter_map(|branch| external_tag(branch)).collect();
+    let is_removed = |(key, member): (&String, &Value)| member.is_null() && tags.contains(&key.as_str());
+    let removed = object.iter().filter(|entry| is_removed(*entry)).count();
+    let left = || object.iter().filter(|entry| !is_removed(*entry)).map(|(key, member)| (key.clone(), member.clone()));
+    (removed > 0 && removed < object.len()).then(|| Value::Object(left().collect()))
 }
 
 /// The branches with references resolved and those of nested alternatives put in their place.

@@ -140,23 +140,9 @@ pub fn simulate(
     roster: &Roster,
     path: &Path,
     keep: Records,
-    tick: impl FnMut(f64),
-) -> Result<Finished, RunError> {
-    simulate_from((loaded, &Shelf::default()), roster, path, keep, tick)
-}
-
-/// As [`simulate`], with a shelf of what other runs have solved.
-///
-/// # Errors
-/// As [`simulate`].
-pub fn simulate_from(
-    (loaded, shelf): (&Loaded, &Shelf),
-    roster: &Roster,
-    path: &Path,
-    keep: Records,
     mut tick: impl FnMut(f64),
 ) -> Result<Finished, RunError> {
-    let mut run = Run::begin_from((loaded, shelf), roster, path, keep)?;
+    let mut run = Run::begin(loaded, roster, path, keep)?;
     let ended = run.to_end(|run| {
         tick(run.simulation.progress());
         None
@@ -193,7 +179,11 @@ impl Run {
         Self::begin_from((loaded, &Shelf::default()), roster, path, keep)
     }
 
-    fn begin_from(
+    /// As [`Run::begin`], with a shelf of what other runs have solved.
+    ///
+    /// # Errors
+    /// As [`Run::begin`].
+    pub(super) fn begin_from(
         (loaded, shelf): (&Loaded, &Shelf),
         roster: &Roster,
         path: &Path,

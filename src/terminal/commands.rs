@@ -126,12 +126,18 @@ pub fn run_ablation(
     prepare_folder(&folder)?;
     let bar = progress_bar(100.0, "%");
     let tick = |share| bar.set_position((share * 1000.0) as u64);
-    let found = ablation::ablate(&loaded, roster, &scene.path(), extent, tick)?;
+    let interrupt = Interrupt::catch().map_err(|error| RunError::Internal(error.to_string()))?;
+    let stop = || interrupt.caught().map(|signal| format!("stopped by {}", signal.name));
+    let found = ablation::ablate(&loaded, roster, &scene.path(), extent, (tick, stop))?;
     bar.finish_and_clear();
+    let signal = interrupt.caught().filter(|_| !found.complete);
+    if let Some(signal) = signal {
+        alarm!("{} stopped by {}: the table has the runs that came to their end", alarming("error:"), signal.name);
+    }
     ablation::report::write(&folder, Asked { loaded: &loaded, command: &cli.words }, &found)?;
     tell!("{}", found.to_string().trim_end());
     tell!("results in {}", folder.display());
-    Ok(ExitCode::from(u8::from(!found.complete)))
+    Ok(ExitCode::from(signal.map_or(u8::from(!found.complete), |signal| signal.code)))
 }
 
 /// Charts a scene.

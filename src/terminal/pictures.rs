@@ -110,7 +110,8 @@ fn time(text: &str) -> Result<f64, String> {
 
 /// A width in µm, from a text with a unit.
 fn width(text: &str) -> Result<f64, String> {
-    quantity(text, Length::KIND, false).and_then(|width| {
+    let read = quantity(text, Length::KIND, false);
+    read.map_err(|_| "a length with its unit belongs here, such as 85mm".to_owned()).and_then(|width| {
         let fits = (20e3..=2e6).contains(&width);
         if fits { Ok(width) } else { Err(format!("{} mm is not from 20 mm to 2 m", format_number(width / 1e3))) }
     })

@@ -64,6 +64,15 @@ impl<'a> Lines<'a> {
         Ok(numbers)
     }
 
+    /// The numbers of the next line, none of them infinite or no number.
+    fn finite(&mut self, least: usize) -> Result<Vec<f64>, String> {
+        let numbers: Vec<f64> = self.numbers(least)?;
+        match numbers.iter().find(|number| !number.is_finite()) {
+            Some(wrong) => Err(self.wrong(&format!("{wrong} where a finite number belongs"))),
+            None => Ok(numbers),
+        }
+    }
+
     fn end(&mut self, section: &str) -> Result<(), String> {
         let line = self.line()?;
         if line == section { Ok(()) } else { Err(self.wrong(&format!("`{line}` where {section} belongs"))) }
@@ -140,7 +149,7 @@ impl Mesh {
     fn read_nodes_2(&mut self, lines: &mut Lines) -> Result<(), String> {
         let count: usize = lines.numbers(1)?[0];
         for _ in 0..count {
-            let node: Vec<f64> = lines.numbers(4)?;
+            let node = lines.finite(4)?;
             self.nodes.insert(node[0] as usize, [node[1], node[2], node[3]]);
         }
         lines.end("$EndNodes")
@@ -155,7 +164,7 @@ impl Mesh {
                 tags.push(lines.numbers(1)?[0]);
             }
             for tag in tags {
-                let place: Vec<f64> = lines.numbers(3)?;
+                let place = lines.finite(3)?;
                 self.nodes.insert(tag, [place[0], place[1], place[2]]);
             }
         }
@@ -281,6 +290,7 @@ mod tests {
             (square(2).replace("2.2 0", "1.0 0"), "line 2: version 1.0"),
             (square(2).replace("2.2 0", "2.2 1"), "line 2: a binary file"),
             (square(2).replace("2 5 0 0", "2 5 zero 0"), "line 11: `2 5 zero 0` where numbers belong"),
+            (square(2).replace("2 5 0 0", "2 nan 0 0"), "line 11: NaN where a finite number belongs"),
             (square(2).replace("3 2 2 9 1 1 2 3", "3 3 2 9 1 1 2 3 4"), "line 19: an element of type 3"),
             (square(2).replace("1 1 4 3\n", "1 1 4 8\n"), "node 8, which is not there"),
             (square(4).replace("5 5 0\n0 5 0\n$EndN", "5 5 1\n0 5 0\n$EndN"), "not planar"),

@@ -8,6 +8,7 @@ mod gmsh;
 mod naming;
 mod svg;
 
+use super::merge::strip_nulls;
 use super::read::read_text;
 use crate::keys;
 use crate::model::quantity::Length;
@@ -90,6 +91,7 @@ struct FoundRing {
 /// A violation at that key: a path that leads out of the folder, a file that cannot be read, what is wrong in it and where.
 pub fn take_in(document: &mut Value, folder: &Path) -> Result<(), Violation> {
     let Some(outline) = document.pointer_mut("/tissue/outline") else { return Ok(()) };
+    strip_nulls(outline);
     let format = outline.as_object().and_then(|keys| keys.keys().next().cloned()).unwrap_or_default();
     if !["geojson", "svg", "gmsh"].contains(&format.as_str()) {
         return Ok(());
@@ -157,6 +159,9 @@ fn read_inside(folder: &Path, file: &str) -> Result<String, String> {
     let path = real(folder.join(path))?;
     if !path.starts_with(real(folder.to_owned())?) {
         return Err(format!("{file}: a link that leads out of the folder of the scenario"));
+    }
+    if !path.is_file() {
+        return Err(format!("{file}: no file to be read from its beginning to its end"));
     }
     read_text(&path).map_err(|error| error.to_string())
 }

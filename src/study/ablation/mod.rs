@@ -9,7 +9,7 @@ mod figure;
 pub mod report;
 mod table;
 
-use super::run::{Records, RunError, read_document, simulate_from};
+use super::run::{Records, Run, RunError, read_document};
 use super::seeds::{bootstrap, in_parallel, leaves};
 use crate::model::health::Counters;
 use crate::model::mechanism::Roster;
@@ -197,7 +197,8 @@ fn without(loaded: &Loaded, off: &[&str], roster: &Roster, path: &Path) -> Resul
     Ok(left)
 }
 
-/// Runs all arms of a scene on the threads of the present pool. `tick` is called after each run with the share done.
+/// Runs all arms of a scene on the threads of the present pool. `tick` is called after each run with the share done; once `stop` gives a
+/// reason, runs that are on their way or have not begun stand among the failures of their arms with it.
 ///
 /// # Errors
 /// Only what must not happen: a scene that is refused without some blocks, cannot be put together or ends in a fault is
@@ -207,7 +208,7 @@ pub fn ablate(
     roster: &Roster,
     path: &Path,
     extent: Extent,
-    tick: impl Fn(f64) + Sync,
+    (tick, stop): (impl Fn(f64) + Sync, impl Fn() -> Option<String> + Sync),
 ) -> Result<Ablation, RunError> {
     let names: Vec<&str> = roster.names().into_iter().filter(|name| loaded.blocks.contains_key(*name)).collect();
     let (mut arms, mut scenes) = (Vec::new(), Vec::new());
@@ -223,12 +224,15 @@ pub fn ablate(
     let shelf = Shelf::default();
     // Seed by seed, so that arms that solve different things do so side by side.
     let run = |job: usize| {
+        if let Some(reason) = stop() {
+            return (Err(reason), Counters::default());
+        }
         let mut own = scenes[job % scenes.len()].1.clone();
         let place = job / scenes.len();
         own.scene.seed = seeds[place];
         own.scene.output.figure_times = if place == 0 { vec![Factor(1.0)] } else { Vec::new() };
         let keep = if place == 0 { Records::FRAMES } else { Records::NOTHING };
-        run_one((&own, &shelf), roster, path, keep)
+        run_one((&own, &shelf), roster, path, (keep, &stop))
     };
     let runs = in_parallel(scenes.len() * seeds.len(), run, tick);
     let (mut solved, count) = (Solved::default(), runs.len());
@@ -254,8 +258,18 @@ pub fn ablate(
     })
 }
 
-fn run_one(scene: (&Loaded, &Shelf), roster: &Roster, path: &Path, keep: Records) -> (Result<Ended, String>, Counters) {
-    let finished = match simulate_from(scene, roster, path, keep, |_| {}) {
+fn run_one(
+    scene: (&Loaded, &Shelf),
+    roster: &Roster,
+    path: &Path,
+    (keep, stop): (Records, &impl Fn() -> Option<String>),
+) -> (Result<Ended, String>, Counters) {
+    let run = || {
+        let mut run = Run::begin_from(scene, roster, path, keep)?;
+        let ended = run.to_end(|_| stop())?;
+        run.finish(scene.0, &ended)
+    };
+    let finished = match run() {
         Ok(finished) => finished,
         Err(error) => return (Err(one_line(error.to_string().lines())), Counters::default()),
     };

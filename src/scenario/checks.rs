@@ -11,9 +11,6 @@ use crate::model::violation::{Violations, pointer_token};
 /// A run of more steps than this would not end.
 const MOST_STEPS: f64 = 1e9;
 
-/// Vertices per area over h², for triangles near the equilateral one: 2/√3.
-const VERTICES_PER_SQUARE: f64 = 1.154_700_538_379_251_7;
-
 impl Scene {
     /// Checks what no single key shows: edges and points that exist, intervals that run forward, a mesh and a number of steps that can
     /// be afforded.
@@ -96,7 +93,7 @@ fn check_tissue(tissue: &Tissue, violations: &mut Violations) {
             "the outline gives the vertices inside; leave out one of both".to_owned()
         });
     }
-    let vertices = VERTICES_PER_SQUARE * tissue.outline.area() / tissue.mesh_size.0.powi(2);
+    let vertices = tissue.expected_vertices();
     violations.demand(vertices <= tissue.max_vertices as f64, "/tissue/mesh_size", || {
         let (size, most) = (tissue.mesh_size, tissue.max_vertices);
         format!("triangles of {size} would need about {vertices:.1e} vertices; max_vertices is {most}")

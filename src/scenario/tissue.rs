@@ -85,6 +85,16 @@ pub enum Outline {
     },
 }
 
+/// Vertices per area over h², for triangles near the equilateral one: 2/√3.
+const VERTICES_PER_SQUARE: f64 = 1.154_700_538_379_251_7;
+
+impl Tissue {
+    /// About how many vertices a mesh of the wanted size has.
+    pub fn expected_vertices(&self) -> f64 {
+        VERTICES_PER_SQUARE * self.outline.area() / self.mesh_size.0.powi(2)
+    }
+}
+
 impl Default for Outline {
     fn default() -> Self {
         Self::Rectangle { width: Length(800.0), height: Length(600.0) }

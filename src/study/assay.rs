@@ -5,7 +5,7 @@
 //! the first heading to the line from start to end; it is positive toward the gradient, which tells attraction from repulsion.
 //! Without a cue nothing is mirrored, and angles are positive to the right.
 
-use crate::record::measures::{signed_angle, turning_angle};
+use crate::record::measures::{path_length, signed_angle, turning_angle};
 use crate::record::plot::{Axis, Level, Plot, Series, Stroke};
 use crate::record::recording::Recording;
 use crate::record::snapshot::Snapshot;
@@ -173,10 +173,9 @@ fn gradient(snapshot: &Snapshot, concentration: &[f64], at: [f64; 2]) -> Option<
 
 /// The point at a share of a path's length.
 fn at_share(path: &[[f64; 2]], share: f64) -> [f64; 2] {
-    let length = |ends: &[[f64; 2]]| (ends[1][0] - ends[0][0]).hypot(ends[1][1] - ends[0][1]);
-    let mut left = share * path.windows(2).map(length).sum::<f64>();
+    let mut left = share * path_length(path);
     for ends in path.windows(2) {
-        let own = length(ends);
+        let own = path_length(ends);
         if own >= left && own > 0.0 {
             let part = left / own;
             return [0, 1].map(|k| ends[0][k] + part * (ends[1][k] - ends[0][k]));
@@ -196,6 +195,8 @@ mod tests {
         assert_eq!(upright([3.0, 2.0], [1.0, 0.0], 1.0), [2.0, 3.0]);
         // The gradient south: a right turn stays one.
         assert_eq!(upright([3.0, -2.0], [1.0, 0.0], -1.0), [2.0, 3.0]);
+        let [aside, along] = upright([0.6, 0.8], [0.6, 0.8], 1.0);
+        assert!(aside.abs() < 1e-15 && (along - 1.0).abs() < 1e-15);
     }
 
     #[test]

@@ -135,7 +135,7 @@ impl ShaftIndex {
             let serve = |(segments, parts, work): &mut (Segments<2>, Vec<Part>, S), task: &[Seat]| -> Vec<_> {
                 let mut found = Vec::with_capacity(task.len());
                 for group in task.chunk_by(Seat::shares_square) {
-                    self.gather(scene, group, cones, (segments, parts));
+                    self.gather(group, cones, (segments, parts));
                     found.extend(group.iter().map(|seat| (seat.cone, act(work, &cones[seat.cone as usize], segments))));
                 }
                 found
@@ -189,7 +189,8 @@ impl ShaftIndex {
             let vertices = all(scene.shafts.block_vertices(block).len());
             Listed { block, vertices, parts: u16::MAX }
         };
-        self.everything = (0..scene.shafts.block_count() as u32).map(listed).collect();
+        let blocks = (0..scene.shafts.block_count() as u32).map(listed);
+        self.everything = blocks.filter(|listed| listed.vertices != 0).collect();
     }
 
     /// Makes lists for another radius.
@@ -213,13 +214,7 @@ impl ShaftIndex {
     }
 
     /// The segments of a square's list that come near any cone of a group.
-    fn gather(
-        &self,
-        scene: &ShaftScene,
-        group: &[Seat],
-        cones: &[Asking],
-        (segments, met): (&mut Segments<2>, &mut Vec<Part>),
-    ) {
+    fn gather(&self, group: &[Seat], cones: &[Asking], (segments, met): (&mut Segments<2>, &mut Vec<Part>)) {
         let positions = || group.iter().map(|seat| cones[seat.cone as usize].position.xy());
         let low = positions().fold(Vector2::repeat(f64::INFINITY), |m, x| m.inf(&x)).add_scalar(-self.reach);
         let high = positions().fold(Vector2::repeat(f64::NEG_INFINITY), |m, x| m.sup(&x)).add_scalar(self.reach);
@@ -234,12 +229,11 @@ impl ShaftIndex {
         }
         for &(number, vertices) in met.iter() {
             let [x, y] = &self.places.lines()[number as usize];
-            let owner = scene.shafts.block_owner(self.places.block(number));
-            let kind = u32::from(scene.populations.0[owner as usize]);
+            let owner = self.places.owner(number);
             let mut rest = vertices;
             while rest != 0 {
                 let i = rest.trailing_zeros() as usize;
-                segments.push([x[i], y[i]], [x[i + 1], y[i + 1]], (owner, kind));
+                segments.push([x[i], y[i]], [x[i + 1], y[i + 1]], owner);
                 rest &= rest - 1;
             }
         }
@@ -369,15 +363,9 @@ impl ShaftScene<'_> {
     }
 
     /// Positions now (µm) of a block's vertices and of the point after them; zeros for vertices not yet stored.
-    fn polyline(&self, block: u32) -> Line {
+    fn polyline(&self, block: u32, after: MaterialPoint<2>) -> Line {
         let mut positions = [[0.0; BLOCK + 1]; 2];
-        let vertices = self.shafts.block_vertices(block);
-        let after = match self.shafts.block_after(block) {
-            Some(next) => self.shafts.point(self.shafts.block_vertices(next).start),
-            None => self.shafts.tip(self.shafts.block_owner(block)),
-        };
-        let points = vertices.map(|vertex| self.shafts.point(vertex)).chain([after]);
-        for (i, point) in points.enumerate() {
+        for (i, point) in self.shafts.block_points(block).chain([after]).enumerate() {
             [positions[0][i], positions[1][i]] = self.position(point);
         }
         positions

@@ -338,7 +338,7 @@ fn a_checkpoint_of_another_version_is_refused() {
     bytes[8] += 1;
     paths(&folder.0).iter().for_each(|path| std::fs::write(path, &bytes).unwrap());
     let words = refusal(&folder);
-    assert_eq!(words.matches("has format 2; this program reads format 1").count(), 2, "{words}");
+    assert_eq!(words.matches("has format 3; this program reads format 2").count(), 2, "{words}");
 }
 
 #[test]

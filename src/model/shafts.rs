@@ -2,9 +2,10 @@
 //!
 //! A vertex is stored where the path bends: the stored polyline stays within a tolerance of every point the cone has
 //! passed (in the reference configuration). Vertices never move once stored, whatever the tissue does, since they are
-//! material. They lie in blocks of a fixed number in flat arrays; blocks are linked shaft by shaft, so that a shaft can
+//! material. They lie in blocks of a fixed number; blocks are linked shaft by shaft, so that a shaft can
 //! grow without moving others and parts can later be struck out. A planar vertex takes 24 bytes.
 
+mod blocks;
 mod sound;
 
 use super::components::Site;
@@ -12,12 +13,13 @@ use super::open_end::OpenEnd;
 use crate::kept;
 use crate::numerics::locate::MaterialPoint;
 use bevy_ecs::prelude::Resource;
+use blocks::{Block, Blocks};
 
 /// Vertices a block.
 pub const BLOCK: usize = 16;
 const NONE: u32 = u32::MAX;
 
-/// Number of a stored vertex: place in the flat arrays.
+/// Number of a stored vertex: its place among those that all blocks have room for.
 pub type VertexId = u32;
 
 /// What follows a stored vertex along its shaft.
@@ -52,26 +54,14 @@ pub struct Shafts {
     pub tolerance: f64,
     /// Longest stored segment (µm, reference configuration).
     pub longest: f64,
-    cells: Vec<u32>,
-    times: Vec<f32>,
-    weights: Vec<[f64; 2]>,
-    used: Vec<u8>,
-    next: Vec<u32>,
-    before: Vec<u32>,
-    owner: Vec<u32>,
+    blocks: Blocks,
     chains: Vec<Chain>,
     watched: bool,
     laid: Vec<VertexId>,
-    /// Of each block, a bit for each vertex that has been laid and not yet been taken as laid.
-    fresh: Vec<u16>,
     struck: Vec<Struck>,
 }
 
-kept! {
-    struct Shafts {
-        tolerance, longest, cells, times, weights, used, next, before, owner, chains, watched, laid, fresh, struck,
-    }
-}
+kept! { struct Shafts { tolerance, longest, blocks, chains, watched, laid, struck } }
 
 /// A vertex that is no longer there, and the material point it was.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -102,17 +92,10 @@ impl Shafts {
         Self {
             tolerance,
             longest,
-            cells: Vec::new(),
-            times: Vec::new(),
-            weights: Vec::new(),
-            used: Vec::new(),
-            next: Vec::new(),
-            before: Vec::new(),
-            owner: Vec::new(),
+            blocks: Blocks::new(count),
             chains: vec![empty; count],
             watched: false,
             laid: Vec::new(),
-            fresh: Vec::new(),
             struck: Vec::new(),
         }
     }
@@ -124,8 +107,7 @@ impl Shafts {
 
     /// Bytes that a stored vertex takes, with its share of a full block.
     pub fn bytes_a_vertex() -> f64 {
-        let block = size_of::<u8>() + size_of::<u16>() + 3 * size_of::<u32>();
-        (size_of::<u32>() + size_of::<f32>() + size_of::<[f64; 2]>()) as f64 + block as f64 / BLOCK as f64
+        Block::BYTES as f64 / BLOCK as f64
     }
 
     /// Bytes that a shaft takes besides: its chain, and on average half a block that is not yet full.
@@ -140,29 +122,31 @@ impl Shafts {
 
     /// Number of stored vertices.
     pub fn vertex_count(&self) -> usize {
-        self.used.iter().map(|&n| n as usize).sum()
+        self.blocks.all().iter().map(|block| usize::from(block.used)).sum()
     }
 
-    /// Number of blocks.
+    /// Number of blocks, those that stand ready without a vertex among them.
     pub fn block_count(&self) -> usize {
-        self.used.len()
+        self.blocks.all().len()
     }
 
     /// The vertices stored in a block, ascending.
     pub fn block_vertices(&self, block: u32) -> std::ops::Range<VertexId> {
         let first = block * BLOCK as u32;
-        first..first + u32::from(self.used[block as usize])
+        first..first + u32::from(self.blocks.get(block).used)
     }
 
-    /// The shaft that a block belongs to.
+    /// The shaft that a block belongs to, and the block in which it goes on.
     #[inline]
-    pub fn block_owner(&self, block: u32) -> u32 {
-        self.owner[block as usize]
+    pub fn block_head(&self, block: u32) -> (u32, Option<u32>) {
+        let Block { owner, next, .. } = *self.blocks.get(block);
+        (owner, Some(next).filter(|&next| next != NONE))
     }
 
-    /// The block in which the shaft of a block goes on.
-    pub fn block_after(&self, block: u32) -> Option<u32> {
-        Some(self.next[block as usize]).filter(|&next| next != NONE)
+    /// Material points of the vertices stored in a block.
+    #[inline]
+    pub fn block_points(&self, block: u32) -> impl Iterator<Item = MaterialPoint<2>> + '_ {
+        self.blocks.get(block).points()
     }
 
     /// Starts a shaft at a site, whose reference position is `at` (µm).
@@ -189,34 +173,21 @@ impl Shafts {
 
     fn push(&mut self, shaft: usize, site: Site, time: f32) {
         let last = self.chains[shaft].last;
-        let full = last == NONE || self.used[last as usize] as usize == BLOCK;
-        let block = if full { self.add_block(shaft) } else { last };
-        let place = block as usize * BLOCK + self.used[block as usize] as usize;
-        self.cells[place] = site.cell;
-        self.times[place] = time;
-        self.weights[place] = [site.weights[0], site.weights[1]];
-        self.used[block as usize] += 1;
+        let full = last == NONE || self.blocks.get(last).is_full();
+        let number = if full { self.add_block(shaft) } else { last };
+        let block = self.blocks.get_mut(number);
+        let vertex = number * BLOCK as u32 + block.push(site, time) as u32;
         if self.watched {
-            self.laid.push(place as VertexId);
-            self.fresh[block as usize] |= bit(place as VertexId);
+            block.fresh |= bit(vertex);
+            self.laid.push(vertex);
         }
     }
 
     fn add_block(&mut self, shaft: usize) -> u32 {
-        let block = self.used.len() as u32;
-        self.cells.resize(self.cells.len() + BLOCK, 0);
-        self.times.resize(self.times.len() + BLOCK, 0.0);
-        self.weights.resize(self.weights.len() + BLOCK, [0.0; 2]);
-        self.used.push(0);
-        self.fresh.push(0);
-        self.next.push(NONE);
-        self.owner.push(shaft as u32);
         let chain = &mut self.chains[shaft];
-        self.before.push(chain.last);
+        let block = self.blocks.begin(shaft, chain.last);
         if chain.last == NONE {
             chain.first = block;
-        } else {
-            self.next[chain.last as usize] = block;
         }
         chain.last = block;
         block
@@ -237,7 +208,7 @@ impl Shafts {
 
     /// Whether a vertex was fresh; it is not from now on.
     fn is_fresh_no_more(&mut self, vertex: VertexId) -> bool {
-        let fresh = &mut self.fresh[vertex as usize / BLOCK];
+        let fresh = &mut self.blocks.get_mut(vertex / BLOCK as u32).fresh;
         let was = *fresh & bit(vertex) != 0;
         *fresh &= !bit(vertex);
         was
@@ -247,7 +218,7 @@ impl Shafts {
     pub fn taken(&self) -> impl Iterator<Item = VertexId> + '_ {
         let blocks = 0..self.block_count() as u32;
         let stored = blocks.flat_map(|block| self.block_vertices(block));
-        stored.filter(|&vertex| self.fresh[vertex as usize / BLOCK] & bit(vertex) == 0)
+        stored.filter(|&vertex| self.blocks.get(vertex / BLOCK as u32).fresh & bit(vertex) == 0)
     }
 
     /// Vertices struck out since the last call that had been taken as laid before: what a neighbour index has to
@@ -285,53 +256,54 @@ impl Shafts {
         if block == NONE {
             return;
         }
-        let vertex = block * BLOCK as u32 + u32::from(self.used[block as usize]) - 1;
+        let vertex = block * BLOCK as u32 + u32::from(self.blocks.get(block).used) - 1;
         if self.watched && !self.is_fresh_no_more(vertex) {
             self.struck.push(Struck { vertex, point: self.point(vertex) });
         }
-        self.used[block as usize] -= 1;
-        if self.used[block as usize] == 0 {
-            let before = self.before[block as usize];
+        let shortened = self.blocks.get_mut(block);
+        shortened.used -= 1;
+        if shortened.used == 0 {
+            let before = shortened.before;
             let chain = &mut self.chains[shaft];
             chain.last = before;
             match before {
                 NONE => chain.first = NONE,
-                before => self.next[before as usize] = NONE,
+                before => self.blocks.get_mut(before).next = NONE,
             }
         }
     }
 
     /// The block before a block along its shaft.
     pub fn block_before(&self, block: u32) -> Option<u32> {
-        Some(self.before[block as usize]).filter(|&before| before != NONE)
+        Some(self.blocks.get(block).before).filter(|&before| before != NONE)
     }
 
     /// The shaft that a stored vertex belongs to.
     #[inline]
     pub fn owner(&self, vertex: VertexId) -> u32 {
-        self.owner[vertex as usize / BLOCK]
+        self.blocks.get(vertex / BLOCK as u32).owner
     }
 
     /// Material point of a stored vertex.
     #[inline]
     pub fn point(&self, vertex: VertexId) -> MaterialPoint<2> {
-        MaterialPoint { cell: self.cells[vertex as usize], weights: self.weights[vertex as usize] }
+        self.blocks.get(vertex / BLOCK as u32).point(vertex as usize % BLOCK)
     }
 
     /// Time (h) at which the cone passed a stored vertex.
     pub fn time(&self, vertex: VertexId) -> f32 {
-        self.times[vertex as usize]
+        self.blocks.get(vertex / BLOCK as u32).time(vertex as usize % BLOCK)
     }
 
     /// What comes after a stored vertex.
     #[inline]
     pub fn successor(&self, vertex: VertexId) -> Successor {
-        let block = vertex as usize / BLOCK;
-        if (vertex as usize % BLOCK) + 1 < self.used[block] as usize {
+        let block = self.blocks.get(vertex / BLOCK as u32);
+        if (vertex as usize % BLOCK) + 1 < usize::from(block.used) {
             return Successor::Vertex(vertex + 1);
         }
-        match self.next[block] {
-            NONE => Successor::Tip(self.owner[block]),
+        match block.next {
+            NONE => Successor::Tip(block.owner),
             next => Successor::Vertex(next * BLOCK as u32),
         }
     }
@@ -367,7 +339,7 @@ impl Shafts {
     pub fn vertices_backwards(&self, shaft: usize) -> impl Iterator<Item = VertexId> + '_ {
         let known = |block: u32| Some(block).filter(|&block| block != NONE);
         let blocks =
-            std::iter::successors(known(self.chains[shaft].last), move |&block| known(self.before[block as usize]));
+            std::iter::successors(known(self.chains[shaft].last), move |&block| known(self.blocks.get(block).before));
         blocks.flat_map(|block| self.block_vertices(block).rev())
     }
 

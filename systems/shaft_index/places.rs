@@ -5,6 +5,7 @@
 
 use super::ShaftScene;
 use crate::model::shafts::BLOCK;
+use crate::numerics::locate::MaterialPoint;
 use crate::numerics::polylines::{Part, Polyline};
 use rayon::prelude::*;
 
@@ -12,12 +13,22 @@ use rayon::prelude::*;
 pub type Line = Polyline<{ BLOCK + 1 }>;
 
 /// Bytes held for a block.
-pub const BYTES_A_BLOCK: usize = size_of::<Line>() + 2 * size_of::<u32>();
+pub const BYTES_A_BLOCK: usize = size_of::<Line>() + size_of::<Head>() + 2 * size_of::<u32>();
+
+/// What the shaft of a block is, and where it goes on.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Head {
+    shaft: u32,
+    kind: u16,
+    /// The point after the last of the block's vertices.
+    after: MaterialPoint<2>,
+}
 
 /// Polylines of the blocks that something looks at.
 #[derive(Debug, Default)]
 pub struct Places {
     lines: Vec<Line>,
+    heads: Vec<Head>,
     /// The block of each line.
     blocks: Vec<u32>,
     /// For each block the number of its line, good if that line is of the block.
@@ -35,9 +46,12 @@ impl Places {
                 self.blocks.push(block);
             }
         }
+        // By itself, a loop so short that the processor waits for many of them at once.
+        self.heads.clear();
+        self.heads.extend(self.blocks.iter().map(|&block| Head::of(scene, block)));
         self.lines.resize(self.blocks.len(), [[0.0; BLOCK + 1]; 2]);
-        let lines = self.lines.par_iter_mut().zip(&self.blocks);
-        lines.with_min_len(64).for_each(|(line, &block)| *line = scene.polyline(block));
+        let lines = self.lines.par_iter_mut().zip(&self.blocks).zip(&self.heads);
+        lines.with_min_len(64).for_each(|((line, &block), head)| *line = scene.polyline(block, head.after));
     }
 
     /// The lines that were found.
@@ -50,8 +64,20 @@ impl Places {
         self.numbers[block as usize]
     }
 
-    /// The block of a line.
-    pub fn block(&self, number: u32) -> u32 {
-        self.blocks[number as usize]
+    /// The shaft of a line, and its kind.
+    pub fn owner(&self, number: u32) -> (u32, u32) {
+        let head = self.heads[number as usize];
+        (head.shaft, u32::from(head.kind))
+    }
+}
+
+impl Head {
+    fn of(scene: &ShaftScene, block: u32) -> Self {
+        let (shaft, next) = scene.shafts.block_head(block);
+        let after = match next {
+            Some(next) => scene.shafts.point(scene.shafts.block_vertices(next).start),
+            None => scene.shafts.tip(shaft),
+        };
+        Self { shaft, kind: scene.populations.0[shaft as usize], after }
     }
 }

@@ -11,11 +11,26 @@ use std::hash::{BuildHasherDefault, Hasher};
 /// Place of a square along the Morton curve.
 pub type Square = u64;
 
+/// Squares of a tile, whose lists lie next to each other in memory: 8 by 8.
+const TILE: usize = 64;
+
 /// The lists of all squares that have one.
 #[derive(Debug, Default)]
 pub struct Squares {
-    numbers: HashMap<Square, u32, BuildHasherDefault<SquareHasher>>,
-    lists: Vec<Vec<Listed>>,
+    numbers: HashMap<u64, u32, BuildHasherDefault<PlaceHasher>>,
+    tiles: Vec<Tile>,
+}
+
+/// The lists of 8 by 8 squares, and a bit for each that there is.
+#[derive(Debug)]
+struct Tile {
+    made: u64,
+    lists: [Vec<Listed>; TILE],
+}
+
+/// Place of a square's tile along the curve, and of the square in it.
+fn tile_and_place(square: Square) -> (u64, usize) {
+    (square / TILE as u64, (square % TILE as u64) as usize)
 }
 
 /// A block of stored vertices in the list of a square.
@@ -29,11 +44,11 @@ pub struct Listed {
     pub parts: u16,
 }
 
-/// Hashes the place of a square: its bits are spread already, and are mixed once.
+/// Hashes the place of a tile: its bits are spread already, and are mixed once.
 #[derive(Debug, Default)]
-pub struct SquareHasher(u64);
+pub struct PlaceHasher(u64);
 
-impl Hasher for SquareHasher {
+impl Hasher for PlaceHasher {
     fn finish(&self) -> u64 {
         self.0
     }
@@ -51,28 +66,35 @@ impl Hasher for SquareHasher {
 impl Squares {
     /// The list of a square; none if it has none yet.
     pub fn get(&self, square: Square) -> Option<&[Listed]> {
-        self.numbers.get(&square).map(|&number| self.lists[number as usize].as_slice())
+        let (tile, place) = tile_and_place(square);
+        let tile = &self.tiles[*self.numbers.get(&tile)? as usize];
+        (tile.made >> place & 1 != 0).then(|| tile.lists[place].as_slice())
     }
 
     /// The list of a square, if it has one, to be changed.
     pub fn get_mut(&mut self, square: Square) -> Option<&mut Vec<Listed>> {
-        self.numbers.get(&square).map(|&number| &mut self.lists[number as usize])
+        let (tile, place) = tile_and_place(square);
+        let tile = &mut self.tiles[*self.numbers.get(&tile)? as usize];
+        (tile.made >> place & 1 != 0).then(|| &mut tile.lists[place])
     }
 
     /// The list of a square, from now on.
     pub fn make(&mut self, square: Square) -> &mut Vec<Listed> {
-        let next = self.lists.len() as u32;
-        let number = *self.numbers.entry(square).or_insert(next);
+        let (tile, place) = tile_and_place(square);
+        let next = self.tiles.len() as u32;
+        let number = *self.numbers.entry(tile).or_insert(next);
         if number == next {
-            self.lists.push(Vec::new());
+            self.tiles.push(Tile { made: 0, lists: std::array::from_fn(|_| Vec::new()) });
         }
-        &mut self.lists[number as usize]
+        let tile = &mut self.tiles[number as usize];
+        tile.made |= 1 << place;
+        &mut tile.lists[place]
     }
 
     /// Forgets all lists.
     pub fn clear(&mut self) {
         self.numbers.clear();
-        self.lists.clear();
+        self.tiles.clear();
     }
 }
 

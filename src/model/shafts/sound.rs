@@ -1,24 +1,20 @@
 //! Whether shafts that were read back hold together: chains that lead through their own blocks and end, vertices in cells that are there.
 
-use super::{BLOCK, Chain, NONE, Shafts};
+use super::{BLOCK, Block, Chain, NONE, Shafts};
 
 impl Shafts {
     /// What makes these shafts impossible in a scene whose fresh ones are `fresh`, on a mesh of `cells` cells; none if nothing does.
     pub(in crate::model) fn defect(&self, fresh: &Self, cells: usize) -> Option<&'static str> {
-        let (blocks, places) = (self.used.len(), self.used.len().saturating_mul(BLOCK));
-        let of_blocks = [self.fresh.len(), self.next.len(), self.before.len(), self.owner.len()];
-        let of_places = [self.cells.len(), self.times.len(), self.weights.len()];
+        let (blocks, places) = (self.blocks.all(), self.blocks.all().len().saturating_mul(BLOCK));
         let there = |cell: u32| (cell as usize) < cells;
         let checks: [(&'static str, &dyn Fn() -> bool); 6] = [
             ("they are those of another scene", &|| {
                 let own = (self.tolerance, self.longest, self.chains.len());
                 own == (fresh.tolerance, fresh.longest, fresh.chains.len())
             }),
-            ("blocks and vertices are not of one number", &|| {
-                of_blocks.iter().all(|&count| count == blocks) && of_places.iter().all(|&count| count == places)
-            }),
-            ("a block holds more than it can", &|| self.used.iter().all(|&used| usize::from(used) <= BLOCK)),
-            ("a vertex lies in no cell", &|| self.cells.iter().all(|&cell| there(cell))),
+            ("a page holds blocks that are taken", &|| self.blocks.pages_are_free(self.chains.len())),
+            ("a block holds more than it can", &|| blocks.iter().all(|block| usize::from(block.used) <= BLOCK)),
+            ("a vertex lies in no cell", &|| blocks.iter().all(|block| block.lies_in(cells))),
             ("a tip lies in no cell", &|| self.chains.iter().all(|chain| there(chain.tip.cell))),
             ("a vertex that was laid or struck out is none", &|| {
                 let laid = self.laid.iter().all(|&vertex| (vertex as usize) < places);
@@ -33,23 +29,24 @@ impl Shafts {
 
     /// Whether each shaft's blocks, none empty, follow each other both ways and belong to no other, and blocks of no shaft are empty.
     fn chains_lead_through_their_blocks(&self) -> bool {
-        let mut seen = vec![false; self.used.len()];
+        let blocks = self.blocks.all();
+        let mut seen = vec![false; blocks.len()];
         for (shaft, Chain { first, last, .. }) in self.chains.iter().enumerate() {
             let (mut at, mut before) = (*first, NONE);
             while at != NONE {
-                let block = at as usize;
-                let is_next = seen.get(block) == Some(&false) && self.used[block] > 0;
-                if !(is_next && self.owner[block] as usize == shaft && self.before[block] == before) {
+                let is_next =
+                    |block: &&Block| block.used > 0 && block.owner as usize == shaft && block.before == before;
+                let Some(block) = blocks.get(at as usize).filter(is_next) else { return false };
+                if std::mem::replace(&mut seen[at as usize], true) {
                     return false;
                 }
-                seen[block] = true;
-                (at, before) = (self.next[block], at);
+                (at, before) = (block.next, at);
             }
             if before != *last {
                 return false;
             }
         }
-        seen.iter().zip(&self.used).all(|(seen, used)| *seen || *used == 0)
+        seen.iter().zip(blocks).all(|(seen, block)| *seen || block.used == 0)
     }
 }
 
@@ -57,6 +54,7 @@ impl Shafts {
 mod tests {
     use super::*;
     use crate::model::components::Site;
+    use crate::model::shafts::Blocks;
 
     fn laid() -> Shafts {
         let mut shafts = Shafts::new(2, 0.5, 12.0);
@@ -75,16 +73,16 @@ mod tests {
         let breaks: [fn(&mut Shafts); 12] = [
             |shafts| shafts.longest = 0.0,
             |shafts| shafts.chains.truncate(1),
-            |shafts| _ = shafts.times.pop(),
-            |shafts| _ = shafts.owner.pop(),
-            |shafts| shafts.used[0] = 17,
-            |shafts| shafts.cells[3] = 1,
+            |shafts| _ = shafts.blocks.get_mut(2).push(Site { cell: 1, ..Site::default() }, 0.0),
+            |shafts| shafts.blocks = Blocks::new(2),
+            |shafts| shafts.blocks.get_mut(0).used = 17,
+            |shafts| shafts.blocks.get_mut(0).used = 0,
             |shafts| shafts.chains[1].tip.cell = 7,
             |shafts| shafts.laid.push(1000),
-            |shafts| shafts.next[shafts.chains[0].last as usize] = shafts.chains[0].first,
+            |shafts| shafts.blocks.get_mut(shafts.chains[0].last).next = shafts.chains[0].first,
             |shafts| shafts.chains[0].first = 99,
             |shafts| shafts.chains[0].last = shafts.chains[0].first,
-            |shafts| shafts.owner[0] = 1,
+            |shafts| shafts.blocks.get_mut(0).owner = 1,
         ];
         for (place, spoil) in breaks.iter().enumerate() {
             let mut spoilt = laid();

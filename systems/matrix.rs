@@ -7,6 +7,8 @@
 //! Ours too: the tissue may grow by itself, F = F_e F_g with F_g = g I, the mass source that the paper leaves out.
 
 mod growth;
+mod own_mesh;
+mod supports;
 
 pub use growth::{GrowingRegion, TissueGrowth};
 
@@ -19,6 +21,7 @@ use crate::numerics::material::MaterialError;
 use crate::prelude::*;
 use std::collections::BTreeMap;
 use std::sync::Arc;
+use supports::{axis_of, hold_the_middle, outward_normal};
 
 /// What an edge does sideways while it moves.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -79,6 +82,10 @@ keys! {
         /// Largest error of the interpolated displacement between load levels, over the tissue's size. Ours.
         #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 0.1, "x-typical" = [1e-8, 1e-4]))]
         pub tolerance: Factor = Factor(1e-6),
+        /// Mesh size on which the matrix is solved, where it is not to be the tissue's own. Displacements are smooth where cues are steep,
+        /// so that a coarser mesh may do. Ours.
+        #[schemars(extend("exclusiveMinimum" = 0.0))]
+        pub mesh_size: Option<Length> = None,
         /// What the displacement does between load levels. Ours.
         pub interpolation: Interpolation = Interpolation::Cubic,
     }
@@ -175,7 +182,15 @@ impl Matrix {
         Ok(prescribed)
     }
 
+    /// Solves the load path on the mesh that the scene asks for, and takes it over to that of the tissue.
     fn solve(&self, tissue: &Tissue, law: Arc<dyn Material<2>>) -> Result<Equilibria, InstallError> {
+        let Some(size) = self.mesh_size else { return self.solve_on(tissue, law) };
+        let own = own_mesh::remeshed(tissue, size.0, &self.outlines())?;
+        let solved = self.solve_on(&own, law)?;
+        Ok(Equilibria { path: own_mesh::taken_over(&solved.path, &own, tissue)?, ..solved })
+    }
+
+    fn solve_on(&self, tissue: &Tissue, law: Arc<dyn Material<2>>) -> Result<Equilibria, InstallError> {
         let growth = self.growth.as_ref().map(|growth| growth.of_cells(tissue)).unwrap_or_default();
         let prescribed = self.prescribed(tissue, &growth)?;
         let body =
@@ -192,7 +207,7 @@ impl Matrix {
         let largest = self.load.largest();
         path.displacement(largest, &mut farthest);
         let used = 1.0 - ellipticity_left(&body, largest, &farthest);
-        Ok(Equilibria { path, used })
+        Ok(Equilibria { path, used, unknowns: body.unknowns() })
     }
 }
 
@@ -233,14 +248,15 @@ impl Mechanism for Matrix {
         let tissue = model.world.resource::<Tissue>();
         let inputs = format!("{} {self:?}", tissue.inputs);
         let (equilibria, new) = model.world.resource::<Shelf>().take(&inputs, || self.solve(tissue, law))?;
-        let Equilibria { path, used } = &*equilibria;
+        let Equilibria { path, used, unknowns } = &*equilibria;
         let duration = model.world.resource::<Clock>().grid.hours(model.world.resource::<Clock>().end);
         record(model.world, path, new);
         tell_kinks(model.world, &self.load);
-        let (unknowns, report) = (2 * model.world.resource::<Tissue>().mesh.vertex_count(), path.report());
+        let report = path.report();
         let why = format!(
-            "{}: {unknowns} unknowns, {} load levels, {} equilibria",
+            "{}: {unknowns} unknowns{}, {} load levels, {} equilibria",
             self.causes(),
+            if self.mesh_size.is_some() { " on a mesh of its own" } else { "" },
             report.levels,
             report.solves
         );
@@ -251,8 +267,8 @@ impl Mechanism for Matrix {
             1.0,
             "less motion, sliding edges or `neo_hookean`",
         );
-        let held = path.path().bytes() as f64 + WORKSPACE * unknowns as f64;
-        let (iterations, moved) = ((unknowns * report.newton_iterations) as f64, 2.0 * unknowns as f64);
+        let held = path.path().bytes() as f64 + WORKSPACE * *unknowns as f64;
+        let (iterations, moved) = ((unknowns * report.newton_iterations) as f64, 2.0 * path.path().components() as f64);
         let mut plan = model.plan();
         plan.hold("matrix", held, Each::Run);
         plan.work("matrix", Work::NewtonUnknown, iterations, Each::Run);
@@ -318,49 +334,14 @@ fn no_such_edge(name: &str, tissue: &Tissue) -> InstallError {
     refuse(name, &unknown_name("edge", name, &tissue.domain.edge_names))
 }
 
-/// Holds the vertex nearest to the middle, and keeps the one farthest from it from turning about it: one component of it moves as it
-/// would if all cells grew by the mean factor.
-fn hold_the_middle(rest: &[[f64; 2]], growth: &Growth, prescribed: &mut Prescribed<2>) {
-    let mean = |k: usize| rest.iter().map(|x| x[k]).sum::<f64>() / rest.len() as f64;
-    let distance = |from: [f64; 2], v: usize| (rest[v][0] - from[0]).hypot(rest[v][1] - from[1]);
-    let middle = [mean(0), mean(1)];
-    let nearest = (0..rest.len()).min_by(|&a, &b| distance(middle, a).total_cmp(&distance(middle, b)));
-    let Some(nearest) = nearest else { return };
-    prescribed.impose_all(nearest, [0.0; 2]);
-    let held = rest[nearest];
-    let farthest = (0..rest.len()).max_by(|&a, &b| distance(held, a).total_cmp(&distance(held, b)));
-    if let Some(farthest) = farthest {
-        let arm = [rest[farthest][0] - held[0], rest[farthest][1] - held[1]];
-        let component = usize::from(arm[0].abs() >= arm[1].abs());
-        prescribed.impose(farthest, component, (growth.mean() - 1.0) * arm[component]);
-    }
-}
-
-/// Mean outward unit normal of an edge at rest, and the tissue's extent (µm) in that direction.
-fn outward_normal(tissue: &Tissue, edge: usize) -> ([f64; 2], f64) {
-    let rest = tissue.mesh.vertices();
-    let mut sum = [0.0; 2];
-    for facet in &tissue.edges[edge] {
-        let ends: Vec<_> = tissue.mesh.facet_vertices(*facet).map(|v| rest[v as usize]).collect();
-        sum = [sum[0] + ends[1][1] - ends[0][1], sum[1] + ends[0][0] - ends[1][0]];
-    }
-    let norm = sum[0].hypot(sum[1]).max(f64::MIN_POSITIVE);
-    let normal = sum.map(|x| x / norm);
-    let heights = rest.iter().map(|x| x[0] * normal[0] + x[1] * normal[1]);
-    let (low, high) = heights.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(x), h.max(x)));
-    (normal, high - low)
-}
-
-fn axis_of(normal: [f64; 2]) -> Option<usize> {
-    (0..2).find(|&k| (normal[k].abs() - 1.0).abs() < 1e-9)
-}
-
 /// What is solved before the run, and shared by runs whose tissue and matrix are equal.
 #[derive(Debug)]
 struct Equilibria {
     path: LoadPath,
     /// Share of ellipticity that the largest load uses up.
     used: f64,
+    /// Unknowns of a solve.
+    unknowns: usize,
 }
 
 /// The solved load path, and the load over time.

@@ -41,13 +41,17 @@ fn number(loaded: &Loaded, pointer: &str) -> f64 {
     loaded.merged.pointer(pointer).and_then(Value::as_f64).unwrap_or(f64::NAN)
 }
 
-/// Tips and the lengths of their paths with a mesh size (um) and a step (h).
-fn tips(scene: &Value, mesh: f64, step: f64, roster: &Roster) -> Vec<(Vector3<f64>, f64)> {
-    let keys = [format!("/tissue/mesh_size={mesh:e}"), format!("/time/step={step:e}"), "/accuracy=null".to_owned()];
-    let loaded = try_load(scene, roster, &[], &keys.each_ref().map(String::as_str)).unwrap();
-    let mut simulation = tropism::simulation::Simulation::assemble(&loaded, roster).unwrap();
+/// Tips and the lengths of their paths.
+fn tips(loaded: &Loaded, roster: &Roster) -> Vec<(Vector3<f64>, f64)> {
+    let mut simulation = tropism::simulation::Simulation::assemble(loaded, roster).unwrap();
     common::to_end(&mut simulation);
     cones(&simulation).iter().map(|cone| (cone.position, cone.length)).collect()
+}
+
+/// A scene with a mesh size (um) and a step (h) of its own in place of an accuracy.
+fn fixed(scene: &Value, mesh: f64, step: f64, roster: &Roster) -> Loaded {
+    let keys = [format!("/tissue/mesh_size={mesh:e}"), format!("/time/step={step:e}"), "/accuracy=null".to_owned()];
+    try_load(scene, roster, &[], &keys.each_ref().map(String::as_str)).unwrap()
 }
 
 /// The error that a scene reaches against a run with a quarter of the mesh size and a sixteenth of the step.
@@ -55,8 +59,8 @@ fn reached(scene: &Value) -> f64 {
     let roster = systems::standard();
     let loaded = found(scene, &roster);
     let (mesh, step) = (number(&loaded, "/tissue/mesh_size"), number(&loaded, "/time/step"));
-    let chosen = tips(scene, mesh, step, &roster);
-    let fine = tips(scene, mesh / 4.0, step / 16.0, &roster);
+    let chosen = tips(&loaded, &roster);
+    let fine = tips(&fixed(scene, mesh / 4.0, step / 16.0, &roster), &roster);
     let squares: Vec<f64> = chosen
         .iter()
         .zip(&fine)
@@ -75,8 +79,15 @@ fn the_accuracy_is_reached_in_a_tissue_at_rest() {
 
 #[test]
 fn the_accuracy_is_reached_in_a_stretched_tissue() {
-    let error = reached(&scene(json!({ "matrix": { "motion": { "top": { "outward": 0.15 } } } })));
+    let stretched =
+        |accuracy: f64| scene(json!({ "accuracy": accuracy, "matrix": { "motion": { "top": { "outward": 0.15 } } } }));
+    let error = reached(&stretched(0.02));
     assert!(error > 0.0 && error <= 0.02, "{error}");
+    let error = reached(&stretched(0.002));
+    assert!(error > 0.0 && error <= 0.002, "{error}");
+    let loaded = found(&stretched(0.002), &systems::standard());
+    let coarser = number(&loaded, "/matrix/mesh_size") / number(&loaded, "/tissue/mesh_size");
+    assert!(coarser == 2.0 || coarser == 4.0, "the matrix is smooth enough for a mesh of its own: {coarser}");
 }
 
 #[test]

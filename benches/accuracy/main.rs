@@ -177,8 +177,12 @@ fn measured(number: u64, folder: &Path) -> Result<Row, RunError> {
         value.parse::<f64>().expect("a number")
     };
     let chosen = Fixed { mesh: key("/tissue/mesh_size="), step: key("/time/step=") };
-    let others: Vec<String> =
-        found.set.iter().filter(|key| !key.contains("mesh_size=") && !key.contains("step=")).cloned().collect();
+    let others: Vec<String> = found
+        .set
+        .iter()
+        .filter(|key| !key.starts_with("/tissue/mesh_size=") && !key.contains("step="))
+        .cloned()
+        .collect();
     let duration = scene["time"]["duration"].as_f64().expect("a duration");
     let bench = Bench { laboratory, others, duration };
     let (reference, finer) = bench.reference(chosen, asked, &scene)?;
@@ -229,7 +233,7 @@ impl Bench<'_> {
         let finest = (1.155 * side("width", 0) * side("height", 1) / MOST_VERTICES).sqrt();
         let mesh = (chosen.mesh / 4.0).max(finest);
         let more: Vec<String> = match scene.get("matrix") {
-            Some(_) => vec![format!("/matrix/tolerance={:e}", 1e-4 * asked)],
+            Some(_) => vec![format!("/matrix/tolerance={:e}", 1e-4 * asked), "/matrix/mesh_size=null".to_owned()],
             None => Vec::new(),
         };
         Ok((self.run(Fixed { mesh, step: chosen.step / 16.0 }, &more)?.0, chosen.mesh / mesh))

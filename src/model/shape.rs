@@ -5,6 +5,8 @@ use serde::{Deserialize, Serialize};
 
 use super::quantity::{Length, format_number};
 use super::violation::Violations;
+use crate::numerics::mesh_grading::Grading;
+use crate::numerics::planar_domain::Outline;
 
 /// A point of the plane `[x, y]` \[µm\].
 pub type Point = [Length; 2];
@@ -45,6 +47,17 @@ impl Shape {
                 (point[0] - centre[0].0).hypot(point[1] - centre[1].0) <= radius.0 * (1.0 + 4.0 * f64::EPSILON)
             }
             Self::Polygon { points } => polygon_contains(&coordinates(points), point),
+        }
+    }
+
+    /// The line that a mesh of this grading is fitted to.
+    pub fn outline(&self, grading: &Grading) -> Outline {
+        match self {
+            Self::Disc { centre, radius } => {
+                let [x, y] = [centre[0].0, centre[1].0];
+                Outline::disc([x, y], radius.0, grading.size_at([x + radius.0, y]))
+            }
+            Self::Polygon { points } => Outline::new(coordinates(points)),
         }
     }
 

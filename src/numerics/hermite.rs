@@ -101,6 +101,13 @@ impl HermitePath {
         Self { interpolation, ..self }
     }
 
+    /// The path of what a linear map makes of the vector. The map gives as many components for each level.
+    pub fn mapped(&self, map: impl Fn(&[f64]) -> Vec<f64>) -> Self {
+        let level =
+            |level: &Level| Level { parameter: level.parameter, value: map(&level.value), slope: map(&level.slope) };
+        Self { levels: self.levels.iter().map(level).collect(), interpolation: self.interpolation }
+    }
+
     /// The levels, in ascending order of their parameter; there is at least one.
     pub fn levels(&self) -> &[Level] {
         &self.levels

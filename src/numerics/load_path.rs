@@ -146,6 +146,11 @@ impl LoadPath {
         self.path.derivative(load, out);
     }
 
+    /// The path of what a linear map makes of the displacement (µm, flat), as that on another mesh; its report stays.
+    pub fn mapped(&self, map: impl Fn(&[f64]) -> Vec<f64>) -> Self {
+        Self { path: self.path.mapped(map), report: self.report.clone() }
+    }
+
     /// The interpolant, for those who need a few components only.
     pub fn path(&self) -> &HermitePath {
         &self.path

@@ -15,7 +15,7 @@ use crate::model::remodel::Unrest;
 use crate::model::schedule::{MotionSchedule, Phase, RightHandSide, Schedules, Term};
 use crate::model::settle::settle;
 use crate::model::shafts::Shafts;
-use crate::model::shape::{Shape, coordinates};
+use crate::model::shape::Shape;
 use crate::model::shelf::Shelf;
 use crate::model::stopwatch::Stopwatch;
 use crate::model::tissue::{Configuration, Tissue};
@@ -211,7 +211,7 @@ impl Meshing<'_> {
     fn fitted(&self, grading: &Grading) -> Result<Tissue, AssemblyError> {
         let keys = &self.scene.tissue;
         let domain = domain(&keys.outline);
-        let outlines: Vec<Outline> = self.named.iter().map(|(_, _, shape)| outline(shape, grading)).collect();
+        let outlines: Vec<Outline> = self.named.iter().map(|(_, _, shape)| shape.outline(grading)).collect();
         let options = MeshOptions {
             size: keys.mesh_size.0,
             min_angle: keys.min_angle.radians(),
@@ -237,16 +237,6 @@ fn domain(outline: &scene::Outline) -> PlanarDomain {
     };
     let holes = outline.holes().iter().map(ring).collect();
     PlanarDomain { vertices: outline.vertices(), ..PlanarDomain::new(ring(&outline.outer()), holes, names.clone()) }
-}
-
-fn outline(shape: &Shape, grading: &Grading) -> Outline {
-    match shape {
-        Shape::Disc { centre, radius } => {
-            let [x, y] = [centre[0].0, centre[1].0];
-            Outline::disc([x, y], radius.0, grading.size_at([x + radius.0, y]))
-        }
-        Shape::Polygon { points } => Outline::new(coordinates(points)),
-    }
 }
 
 fn install(

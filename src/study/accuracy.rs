@@ -18,8 +18,8 @@
 //! sequences say where to look: pairs of places with √(e_Δt² + e_h²) ≤ 4 ε are tried in order of their work (a step
 //! that was bad on the middling mesh may be good on a finer one), and the first is taken whose tips lie within 0.9 ε,
 //! the tail of the finest included, of those of one run with the finest of both. Work is counted, not timed, so that
-//! the choice is the same everywhere. The tolerance of the load path is ε/1000. Keys that the scene gives itself are
-//! kept. Ours: all of this.
+//! the choice is the same everywhere. A matrix that moves is then tried on a mesh of its own, 4 and 2 times coarser.
+//! The tolerance of the load path is ε/1000. Keys that the scene gives itself are kept. Ours: all of this.
 
 use super::laboratory::{ConeView, Laboratory, chaotic, cones, few_axons, root_mean_square, run_until};
 use super::run::{RunError, read};
@@ -40,6 +40,8 @@ const TAKEN: f64 = 0.9;
 const MOST_TRIALS: usize = 16;
 /// Tolerance of the load path over the accuracy.
 const LEVELS: f64 = 1e-3;
+/// Mesh sizes tried for the matrix alone, over that of the tissue.
+const COARSER_FOR_MATRIX: [f64; 2] = [4.0, 2.0];
 /// Axons of a population in a pilot.
 const PILOT_AXONS: u64 = 200;
 /// The coarsest mesh tried: this share of the tissue's smaller extent.
@@ -115,7 +117,8 @@ pub fn find(laboratory: &Laboratory) -> Result<Option<Found>, RunError> {
         let problems = vec![Violation::new("/accuracy", message)];
         return Err(RunError::Scenario(ScenarioErrors { path: laboratory.request.path.clone(), problems }));
     }
-    let mut search = Search { laboratory, scene: &scene, mesh: None, step: scene.scene.time.step.0, pilots: 0, asked };
+    let step = scene.scene.time.step.0;
+    let mut search = Search { laboratory, scene: &scene, mesh: None, matrix_mesh: None, step, pilots: 0, asked };
     search.mesh = (!mesh_given).then(|| search.mesh_size(MESH_FOR_STEPS));
     if !step_given {
         search.step = search.longest_step()?;
@@ -123,8 +126,12 @@ pub fn find(laboratory: &Laboratory) -> Result<Option<Found>, RunError> {
     let steps = if step_given { Sequence::fixed(search.step) } else { search.refined_steps()? };
     search.step = steps.values[steps.settled];
     let meshes = if mesh_given { Sequence::fixed(0.0) } else { search.refined_meshes()? };
-    let (step, mesh, estimated) = search.cheapest(&steps, &meshes)?;
+    let Choice { step, mesh, mut error, judge } = search.cheapest(&steps, &meshes)?;
     search.put(&steps, step, &meshes, mesh);
+    if let Some(judge) = judge {
+        error = search.coarser_matrix(&judge)?.unwrap_or(error);
+    }
+    let estimated = error;
     let (by_step, by_mesh) = (steps.errors[step], meshes.errors[mesh]);
     let mut set = search.keys();
     set.push("/accuracy=null".to_owned());
@@ -154,10 +161,33 @@ struct Search<'a> {
     scene: &'a Loaded,
     /// Mesh size (µm); none where the scene's own is kept.
     mesh: Option<f64>,
+    /// Mesh size of the matrix (µm); none where it is that of the tissue, or the scene's own.
+    matrix_mesh: Option<f64>,
     /// Step (h).
     step: f64,
     pilots: usize,
     asked: f64,
+}
+
+/// Places of a step and a mesh size in their sequences, and how wrong tips are with them.
+struct Choice {
+    step: usize,
+    mesh: usize,
+    error: f64,
+    /// What it was judged by, if it was found to be good enough.
+    judge: Option<Judge>,
+}
+
+/// A run with the finest of both, and a bound of its own error.
+struct Judge {
+    finest: Pilot,
+    tail: f64,
+}
+
+impl Judge {
+    fn error(&self, pilot: &Pilot) -> f64 {
+        difference(&pilot.tips, &self.finest.tips) + self.tail
+    }
 }
 
 /// What a pilot run left.
@@ -234,6 +264,7 @@ impl Search<'_> {
         if self.scene.blocks.contains_key("matrix") && !given(self.scene, "/matrix/tolerance") {
             keys.push(format!("/matrix/tolerance={:e}", (LEVELS * self.asked).clamp(1e-9, 1e-3)));
         }
+        keys.extend(self.matrix_mesh.map(|size| format!("/matrix/mesh_size={size:e}")));
         keys
     }
 
@@ -308,10 +339,11 @@ impl Search<'_> {
         self.mesh = self.mesh.map(|_| meshes.values[mesh]);
     }
 
-    /// The pair of least work among those that meet the accuracy by one run with the finest of both, with its error.
-    fn cheapest(&mut self, steps: &Sequence, meshes: &Sequence) -> Result<(usize, usize, f64), RunError> {
+    /// The pair of least work among those that meet the accuracy by one run with the finest of both.
+    fn cheapest(&mut self, steps: &Sequence, meshes: &Sequence) -> Result<Choice, RunError> {
         let both = |i: usize, j: usize| steps.errors[i].hypot(meshes.errors[j]);
-        let settled = (steps.settled, meshes.settled, both(steps.settled, meshes.settled));
+        let (step, mesh) = (steps.settled, meshes.settled);
+        let settled = Choice { step, mesh, error: both(step, mesh), judge: None };
         let places = |sequence: &Sequence| 0..sequence.errors.len();
         let all = places(steps).flat_map(|i| places(meshes).map(move |j| (i, j)));
         let mut pairs: Vec<_> = all.filter(|&(i, j)| both(i, j) <= TRIED * self.asked).collect();
@@ -321,16 +353,32 @@ impl Search<'_> {
         let work_of = |&(i, j): &(usize, usize)| work(&steps.counts[i], &meshes.counts[j]);
         pairs.sort_by(|a, b| work_of(a).total_cmp(&work_of(b)));
         self.put(steps, steps.finest(), meshes, meshes.finest());
-        let finest = self.pilot()?;
-        let tail = steps.tail.hypot(meshes.tail);
-        for (i, j) in pairs.into_iter().take(MOST_TRIALS) {
-            self.put(steps, i, meshes, j);
-            let error = difference(&self.pilot()?.tips, &finest.tips) + tail;
+        let judge = Judge { finest: self.pilot()?, tail: steps.tail.hypot(meshes.tail) };
+        for (step, mesh) in pairs.into_iter().take(MOST_TRIALS) {
+            self.put(steps, step, meshes, mesh);
+            let error = judge.error(&self.pilot()?);
             if error <= TAKEN * self.asked {
-                return Ok((i, j, error));
+                return Ok(Choice { step, mesh, error, judge: Some(judge) });
             }
         }
         Ok(settled)
+    }
+
+    /// Puts a matrix that moves on the coarsest mesh of its own with which the accuracy is met; returns the error then, if there is one.
+    fn coarser_matrix(&mut self, judge: &Judge) -> Result<Option<f64>, RunError> {
+        let free = self.scene.blocks.contains_key("matrix") && !given(self.scene, "/matrix/mesh_size");
+        let (true, true, Some(size)) = (free, judge.finest.counts.moves, self.mesh) else { return Ok(None) };
+        let coarsest = self.mesh_size(0);
+        for coarser in COARSER_FOR_MATRIX.map(|times| times * size).into_iter().filter(|size| *size <= coarsest) {
+            self.matrix_mesh = Some(coarser);
+            // A mesh on which there is no equilibrium is none to take.
+            let error = self.pilot().map_or(f64::INFINITY, |pilot| judge.error(&pilot));
+            if error <= TAKEN * self.asked {
+                return Ok(Some(error));
+            }
+        }
+        self.matrix_mesh = None;
+        Ok(None)
     }
 
     fn pilot(&mut self) -> Result<Pilot, RunError> {

@@ -11,4 +11,5 @@ mod noise;
 mod remodelling;
 mod tissue;
 mod tissue_growth;
+mod tissue_mesh;
 mod turning;

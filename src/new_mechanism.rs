@@ -42,8 +42,8 @@ pub struct NewMechanism<'a> {
     pub name: &'a str,
     /// The folder in which the crate's folder is made.
     pub parent: &'a Path,
-    /// The sources of tropism.
-    pub sources: &'a Path,
+    /// The sources of tropism; none: the nearest folder with them above the program or the current folder.
+    pub sources: Option<&'a Path>,
     /// Keys that stand at the top of a scene already: of mechanisms and others.
     pub taken: &'a [String],
 }
@@ -82,7 +82,11 @@ impl NewMechanism<'_> {
             let message = format!("{} exists already; nothing is written over", folder.display());
             return Err(NewMechanismError::Refused(message));
         }
-        let sources = Sources::find(self.sources).map_err(NewMechanismError::Refused)?;
+        let sources = match self.sources {
+            Some(folder) => Sources::find(folder),
+            None => Sources::nearest(),
+        };
+        let sources = sources.map_err(NewMechanismError::Refused)?;
         let mut files = Vec::new();
         for (path, template) in FILES {
             let path = path.replace(TEMPLATE[0], self.name);
@@ -107,6 +111,17 @@ struct Sources {
 }
 
 impl Sources {
+    /// Those above the program, which lies among what was built of them, else above the current folder. The program does not remember where
+    /// it was built: its bytes are the same wherever that was.
+    fn nearest() -> Result<Self, String> {
+        let starts = [std::env::current_exe(), std::env::current_dir()];
+        let found =
+            starts.iter().flatten().flat_map(|start| start.ancestors()).find_map(|folder| Self::find(folder).ok());
+        found.ok_or_else(|| {
+            "no sources of tropism lie above the program or this folder; name them by --tropism PATH".to_owned()
+        })
+    }
+
     fn find(folder: &Path) -> Result<Self, String> {
         let refuse = |why: &str| format!("{} {why}; name the sources of tropism by --tropism PATH", folder.display());
         let folder = folder.canonicalize().map_err(|error| refuse(&format!("cannot be read ({error})")))?;

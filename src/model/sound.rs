@@ -4,7 +4,7 @@
 
 use super::births::BirthQueue;
 use super::clock::{Clock, StageTime};
-use super::components::{GrowthCone, Site};
+use super::components::{GrowthCone, Site, Status};
 use super::keep::Damage;
 use super::remodel::SpareCones;
 use super::shafts::Shafts;
@@ -54,6 +54,7 @@ impl Given {
             ("births", both(&self.births, world.get_resource(), BirthQueue::may_become)),
             ("spare cones", both(&self.spares, world.get_resource(), SpareCones::may_become)),
             ("identities", identities(world) == self.cones),
+            ("statuses", clock.is_none_or(|clock| nobody_grows_before_birth(clock.now, world))),
             ("sites", sites_are_in(cells, world)),
         ];
         if let Some((name, _)) = checks.iter().find(|(_, fine)| !fine) {
@@ -81,4 +82,43 @@ fn identities(world: &World) -> Vec<(u32, u16)> {
 fn sites_are_in(cells: usize, world: &World) -> bool {
     let Some(mut sites) = world.try_query_filtered::<&Site, With<GrowthCone>>() else { return true };
     sites.iter(world).all(|site| (site.cell as usize) < cells && site.weights.iter().all(|weight| weight.is_finite()))
+}
+
+/// Whether all cones that have begun were born by now (ticks).
+fn nobody_grows_before_birth(now: u64, world: &World) -> bool {
+    let Some(mut cones) = world.try_query::<(&GrowthCone, &Status)>() else { return true };
+    cones.iter(world).all(|(cone, status)| *status == Status::Unborn || cone.birth <= now)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::clock::TimeGrid;
+
+    fn world(now: u64, cones: [(u64, Status); 2]) -> World {
+        let mut world = World::new();
+        world.insert_resource(Clock { now, ..Clock::new(TimeGrid::new(0.1).unwrap(), 1 << 40) });
+        for (axon, (birth, status)) in (0..).zip(cones) {
+            world.spawn((GrowthCone { axon, population: 0, speed: 1.0, birth, birth_time: 0.0 }, status));
+        }
+        world
+    }
+
+    #[test]
+    fn a_cone_that_grows_before_its_birth_is_of_no_run() {
+        let step = TimeGrid::new(0.1).unwrap().step_ticks();
+        let fresh = world(0, [(step, Status::Unborn), (u64::MAX, Status::Unborn)]);
+        let fits = |now: u64, first: (u64, Status)| {
+            Given::of(&fresh)
+                .fits(&world(now, [first, (u64::MAX, Status::Unborn)]))
+                .map_err(|damage| damage.to_string())
+        };
+        assert_eq!(fits(step, (step, Status::Growing)), Ok(()));
+        assert_eq!(fits(4 * step, (step, Status::Arrived)), Ok(()));
+        assert_eq!(fits(step, (2 * step, Status::Unborn)), Ok(()));
+        for status in [Status::Growing, Status::Retracting] {
+            let refused = fits(step, (2 * step, status)).unwrap_err();
+            assert!(refused.contains("`statuses`"), "{refused}");
+        }
+    }
 }

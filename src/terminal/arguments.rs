@@ -158,7 +158,7 @@ pub enum Command {
         /// Folder in which the crate's folder is made
         #[arg(long, value_name = "DIR", default_value = ".")]
         path: PathBuf,
-        /// Sources of tropism [default: those that this program was built from]
+        /// Sources of tropism [default: the nearest above this program or the current folder]
         #[arg(long, value_name = "PATH")]
         tropism: Option<PathBuf>,
     },

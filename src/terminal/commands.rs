@@ -95,7 +95,6 @@ pub fn list_mechanisms(name: Option<&str>, json: bool, roster: &Roster) -> Resul
 /// Why there are no results, or not all of them.
 pub fn new_mechanism(name: &str, parent: &Path, sources: Option<&Path>, roster: &Roster) -> Result<ExitCode, RunError> {
     let taken = top_keys(&block_schemas(roster));
-    let sources = sources.unwrap_or(Path::new(env!("CARGO_MANIFEST_DIR")));
     let written = NewMechanism { name, parent, sources, taken: &taken }.write().map_err(|error| match error {
         NewMechanismError::Refused(message) => RunError::Arguments(message),
         NewMechanismError::Write(error) => RunError::Write(error),

@@ -222,6 +222,31 @@ fn a_new_mechanism_is_written_whole_under_its_own_name() {
 }
 
 #[test]
+fn a_program_that_lies_far_from_its_sources_finds_those_above_the_folder_or_asks_for_them() {
+    let folder = Folder::new();
+    let program = folder.0.join("tropism");
+    std::fs::copy(env!("CARGO_BIN_EXE_tropism"), &program).unwrap();
+    let run = |at: &Path, more: &[&str]| {
+        let parent = folder.0.to_str().unwrap();
+        let arguments = [&["new-mechanism", "wind", "--path", parent], more].concat();
+        Command::new(&program).current_dir(at).args(arguments).output().unwrap()
+    };
+    let lost = run(&folder.0, &[]);
+    let words = String::from_utf8_lossy(&lost.stderr).into_owned();
+    assert_eq!(code(&lost), 2, "{words}");
+    assert!(words.contains("name them by --tropism PATH"), "{words}");
+    assert!(!folder.0.join("wind").exists());
+    let sources = Path::new(env!("CARGO_MANIFEST_DIR"));
+    for (at, more) in
+        [(sources.join("src/model"), vec![]), (folder.0.clone(), vec!["--tropism", sources.to_str().unwrap()])]
+    {
+        let found = run(&at, &more);
+        assert_eq!(code(&found), 0, "{}", String::from_utf8_lossy(&found.stderr));
+        std::fs::remove_dir_all(folder.0.join("wind")).unwrap();
+    }
+}
+
+#[test]
 fn a_bad_name_and_a_folder_in_the_way_are_refused_and_nothing_is_written() {
     let folder = Folder::new();
     for (name, words) in [

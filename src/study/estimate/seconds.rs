@@ -1,7 +1,7 @@
 //! The estimate of time: CPU seconds of one thread for a whole run, what is solved before the first step included.
 //!
 //! Counts times the nanoseconds below, which were measured on the reference machine (two shared x86-64 cores) on 2026-11-23 and
-//! are good for a factor 2 each way.
+//! are good for a third each way there; other machines are slower or faster as a whole.
 
 use super::{Estimate, Expectation, done};
 use crate::model::plan::{Plan, Work};
@@ -11,35 +11,35 @@ use bevy_ecs::prelude::World;
 /// Nanoseconds in a second.
 const SECOND: f64 = 1e9;
 /// The start of the program (ns).
-const START: f64 = 1e7;
+const START: f64 = 5e6;
 /// A vertex of the mesh: meshing, edges, regions (ns).
-const MESH_VERTEX: f64 = 6000.0;
+const MESH_VERTEX: f64 = 3000.0;
 /// A step besides its stages and cones (ns).
-const STEP: f64 = 20_000.0;
+const STEP: f64 = 10_000.0;
 /// A growing cone at a stage: place, turn, walk, shaft (ns).
-const CONE_STAGE: f64 = 1400.0;
+const CONE_STAGE: f64 = 280.0;
 /// A row of `trajectories.csv` (ns).
-const ROW: f64 = 1500.0;
+const ROW: f64 = 700.0;
 /// A figure, whatever it shows: page, fonts, fields, compression (ns).
-const FIGURE: f64 = 3e8;
+const FIGURE: f64 = 9e7;
 /// A byte of the recording as it is filmed: looking, deflating, measures (ns).
-const RECORDED_BYTE: f64 = 120.0;
+const RECORDED_BYTE: f64 = 8.0;
 /// A shaft vertex in a panel (ns).
-const DRAWN_VERTEX: f64 = 3000.0;
+const DRAWN_VERTEX: f64 = 500.0;
 
 /// Nanoseconds of one unit of work that a part of a scene has told.
 pub(super) fn unit(work: Work) -> f64 {
     match work {
-        Work::NewtonUnknown => 3000.0,
-        Work::FieldUnknown => 6500.0,
-        Work::Interpolated => 5.0,
-        Work::DeformedCell => 90.0,
-        Work::Sampled => 100.0,
-        Work::BorderFacet => 2.0,
-        Work::Neighbourhood => 4500.0,
+        Work::NewtonUnknown => 2700.0,
+        Work::FieldUnknown => 720.0,
+        Work::Interpolated => 1.0,
+        Work::DeformedCell => 19.0,
+        Work::Sampled => 20.0,
+        Work::BorderFacet => 0.4,
+        Work::Neighbourhood => 950.0,
         // Bundles put many more within reach than even spreading does; that is in it.
-        Work::EvenSegment => 800.0,
-        Work::Indexed => 5000.0,
+        Work::EvenSegment => 170.0,
+        Work::Indexed => 1050.0,
     }
 }
 

@@ -8,8 +8,11 @@
 //! quarter of it. Seconds are CPU time of one thread, median of three; two scenes at a time, each on a thread of its
 //! own.
 
+#[path = "../shared/cpu.rs"]
+mod cpu;
 mod scenes;
 
+use cpu::cpu_seconds;
 use nalgebra::Vector3;
 use std::path::Path;
 use std::sync::Mutex;
@@ -269,13 +272,6 @@ impl Bench<'_> {
         let same = chosen.mesh == best.mesh && chosen.step == best.step;
         Ok((median(|pair| pair.0), if same { median(|pair| pair.0) } else { median(|pair| pair.1) }))
     }
-}
-
-/// CPU time of this thread so far, which other work on the machine hardly touches.
-fn cpu_seconds() -> f64 {
-    let line = std::fs::read_to_string("/proc/thread-self/schedstat").expect("Linux tells the CPU time of a thread");
-    let nanoseconds: f64 = line.split(' ').next().and_then(|word| word.parse().ok()).expect("nanoseconds");
-    1e-9 * nanoseconds
 }
 
 /// Root mean square of the distance between tips over the length of their paths.

@@ -18,9 +18,12 @@
 //! same function, which drops a segment that begins too far off before it looks for its end. Seconds are CPU time of one thread, those of
 //! asking with the lists that are made on the way; medians of three up to 10 000 axons, one run each beyond, the four in turn.
 
+#[path = "../shared/cpu.rs"]
+mod cpu;
 mod load;
 mod structures;
 
+use cpu::cpu_seconds;
 use load::{Found, Load};
 use structures::{Cells, Everything, GridLists, Neighbours, Tree, TreeLists};
 
@@ -121,12 +124,4 @@ fn run<N: Neighbours>(axons: usize, steps: usize) -> Run {
     }
     run.bytes = neighbours.bytes();
     run
-}
-
-/// CPU time of this thread so far, which other work on the machine hardly touches. It is brought up to date when the thread gives way.
-fn cpu_seconds() -> f64 {
-    std::thread::yield_now();
-    let line = std::fs::read_to_string("/proc/thread-self/schedstat").expect("Linux tells the CPU time of a thread");
-    let nanoseconds: f64 = line.split(' ').next().and_then(|word| word.parse().ok()).expect("nanoseconds");
-    1e-9 * nanoseconds
 }

@@ -7,6 +7,7 @@ use super::quantity::{Length, format_number};
 use super::violation::Violations;
 use crate::numerics::mesh_grading::Grading;
 use crate::numerics::planar_domain::Outline;
+use crate::numerics::polygon::{contains_or_touches, sides, signed_area, turn};
 
 /// A point of the plane `[x, y]` \[µm\].
 pub type Point = [Length; 2];
@@ -46,7 +47,7 @@ impl Shape {
             Self::Disc { centre, radius } => {
                 (point[0] - centre[0].0).hypot(point[1] - centre[1].0) <= radius.0 * (1.0 + 4.0 * f64::EPSILON)
             }
-            Self::Polygon { points } => polygon_contains(&coordinates(points), point),
+            Self::Polygon { points } => contains_or_touches(&coordinates(points), point),
         }
     }
 
@@ -82,43 +83,13 @@ pub fn coordinates(points: &[Point]) -> Vec<[f64; 2]> {
     points.iter().map(|point| [point[0].0, point[1].0]).collect()
 }
 
-/// The area of a closed line, `½ Σ xᵢ yᵢ₊₁ − xᵢ₊₁ yᵢ`: positive when it runs counter-clockwise.
-pub fn signed_area(ring: &[[f64; 2]]) -> f64 {
-    let Some(&origin) = ring.first() else { return 0.0 };
-    let twice: f64 = segments(ring).map(|(a, b)| cross(origin, a, b)).sum();
-    0.5 * twice
-}
-
-/// Whether a point lies inside a closed line or on it, to round-off.
-pub fn polygon_contains(ring: &[[f64; 2]], point: [f64; 2]) -> bool {
-    let mut inside = false;
-    for (a, b) in segments(ring) {
-        if distance_to_segment(point, a, b) <= 1e-12 * (1.0 + point[0].abs() + point[1].abs()) {
-            return true;
-        }
-        if (a[1] > point[1]) != (b[1] > point[1]) && (cross(a, b, point) > 0.0) == (b[1] > a[1]) {
-            inside = !inside;
-        }
-    }
-    inside
-}
-
-/// The distance of a point from a segment \[µm\].
-pub fn distance_to_segment(point: [f64; 2], a: [f64; 2], b: [f64; 2]) -> f64 {
-    let (edge, offset) = ([b[0] - a[0], b[1] - a[1]], [point[0] - a[0], point[1] - a[1]]);
-    let length_squared = edge[0] * edge[0] + edge[1] * edge[1];
-    let share = if length_squared > 0.0 { (offset[0] * edge[0] + offset[1] * edge[1]) / length_squared } else { 0.0 };
-    let share = share.clamp(0.0, 1.0);
-    (offset[0] - share * edge[0]).hypot(offset[1] - share * edge[1])
-}
-
 /// Notes what keeps a closed line from being the border of a region: fewer than three points, a side of no length, no area, a
 /// crossing of two sides.
 pub fn check_ring(ring: &[[f64; 2]], pointer: &str, violations: &mut Violations) {
     if ring.len() < 3 {
         return violations.push(pointer, format!("{} points do not enclose an area", ring.len()));
     }
-    for (index, (a, b)) in segments(ring).enumerate() {
+    for (index, [a, b]) in sides(ring).enumerate() {
         let next = (index + 1) % ring.len();
         violations.demand(a != b, &format!("{pointer}/{next}"), || {
             format!("[{}, {}] repeats the point before it", format_number(b[0]), format_number(b[1]))
@@ -135,9 +106,9 @@ pub fn check_ring(ring: &[[f64; 2]], pointer: &str, violations: &mut Violations)
 
 /// The first two sides that cross at an inner point of both, by a sweep along x.
 fn find_crossing(ring: &[[f64; 2]]) -> Option<(usize, usize)> {
-    let sides: Vec<_> = segments(ring).collect();
+    let sides: Vec<_> = sides(ring).collect();
     let span = |index: usize| {
-        let (a, b) = sides[index];
+        let [a, b] = sides[index];
         (a[0].min(b[0]), a[0].max(b[0]))
     };
     let mut order: Vec<usize> = (0..sides.len()).collect();
@@ -153,21 +124,9 @@ fn find_crossing(ring: &[[f64; 2]]) -> Option<(usize, usize)> {
     None
 }
 
-type Side = ([f64; 2], [f64; 2]);
-
-fn cross_properly((a, b): Side, (c, d): Side) -> bool {
+fn cross_properly([a, b]: [[f64; 2]; 2], [c, d]: [[f64; 2]; 2]) -> bool {
     let opposite = |p: f64, q: f64| (p > 0.0 && q < 0.0) || (p < 0.0 && q > 0.0);
-    opposite(cross(a, b, c), cross(a, b, d)) && opposite(cross(c, d, a), cross(c, d, b))
-}
-
-/// The sides of a closed line, from each point to the next.
-pub fn segments(ring: &[[f64; 2]]) -> impl Iterator<Item = Side> + '_ {
-    ring.iter().enumerate().map(|(index, &point)| (point, ring[(index + 1) % ring.len()]))
-}
-
-/// Twice the signed area of the triangle `abc`.
-fn cross(a: [f64; 2], b: [f64; 2], c: [f64; 2]) -> f64 {
-    (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+    opposite(turn(a, b, c), turn(a, b, d)) && opposite(turn(c, d, a), turn(c, d, b))
 }
 
 #[cfg(test)]

@@ -1,10 +1,13 @@
 //! The tissue Ω_M: its mesh in the reference configuration, and the configuration it is in now.
 
 use super::components::Site;
+use super::shape::Shape;
 use crate::numerics::locate::SeedGrid;
+use crate::numerics::mesh_grading::Grading;
 use crate::numerics::planar_domain::PlanarDomain;
 use crate::numerics::polygon::{nearest_on_side, sides};
 use crate::numerics::simplex_mesh::{BorderFacet, SimplexMesh};
+use crate::numerics::triangulate::{FittedMesh, MeshOptions, TriangulationError, triangulate_graded};
 use bevy_ecs::prelude::Resource;
 use nalgebra::{Matrix2, Vector2, Vector3};
 use rayon::prelude::*;
@@ -23,14 +26,27 @@ pub struct Tissue {
     pub regions: BTreeMap<String, Vec<u32>>,
     /// Border facets of each named edge (in the order of `domain.edge_names`), each list in the order of the outline's points.
     pub edges: Vec<Vec<BorderFacet>>,
+    /// How fine and how good the mesh was to be.
+    pub options: MeshOptions,
     /// What it was made from, as text: equal inputs, equal tissue.
     pub inputs: Arc<str>,
     seeds: SeedGrid<2>,
 }
 
 impl Tissue {
-    /// Puts mesh, edges and regions together, which were made from `inputs`.
-    pub fn new(domain: PlanarDomain, mesh: SimplexMesh<2>, regions: BTreeMap<String, Vec<u32>>, inputs: &str) -> Self {
+    /// Meshes a domain, fitted to named shapes, all of it given by `inputs`.
+    ///
+    /// # Errors
+    /// A domain or shape that cannot be meshed as the options ask; outlines are counted as the shapes come.
+    pub fn meshed<'s>(
+        domain: PlanarDomain,
+        shapes: impl Iterator<Item = (&'s str, &'s Shape)>,
+        (options, grading): (MeshOptions, &Grading),
+        inputs: &str,
+    ) -> Result<Self, TriangulationError> {
+        let (names, outlines): (Vec<_>, Vec<_>) = shapes.map(|(name, shape)| (name, shape.outline(grading))).unzip();
+        let FittedMesh { mesh, regions, .. } = triangulate_graded(&domain, &outlines, &options, grading)?;
+        let regions = names.into_iter().map(str::to_owned).zip(regions).collect();
         let mut edges = vec![Vec::new(); domain.edge_names.len()];
         for facet in mesh.border() {
             if let Some(list) = edges.get_mut(facet.edge as usize) {
@@ -41,7 +57,7 @@ impl Tissue {
             order_along(&domain, &mesh, list);
         }
         let seeds = SeedGrid::new(&mesh, mesh.vertices());
-        Self { domain, mesh: Arc::new(mesh), regions, edges, inputs: inputs.into(), seeds }
+        Ok(Self { domain, mesh: Arc::new(mesh), regions, edges, options, inputs: inputs.into(), seeds })
     }
 
     /// Index of a named edge.

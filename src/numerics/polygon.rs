@@ -25,6 +25,14 @@ pub fn signed_area(points: &[[f64; 2]]) -> f64 {
     sides(points).map(|[a, b]| 0.5 * cross(minus(a, origin), minus(b, origin))).sum()
 }
 
+/// The distance of a point from a segment (µm).
+pub fn distance_to_segment(point: [f64; 2], [from, to]: [[f64; 2]; 2]) -> f64 {
+    let (along, offset) = (minus(to, from), minus(point, from));
+    let squared = dot(along, along);
+    let share = if squared > 0.0 { (dot(offset, along) / squared).clamp(0.0, 1.0) } else { 0.0 };
+    (offset[0] - share * along[0]).hypot(offset[1] - share * along[1])
+}
+
 /// Nearest point of a side to a point, with the side's left normal.
 pub fn nearest_on_side([from, to]: [[f64; 2]; 2], point: [f64; 2]) -> NearestOnEdge {
     let along = minus(to, from);
@@ -35,6 +43,11 @@ pub fn nearest_on_side([from, to]: [[f64; 2]; 2], point: [f64; 2]) -> NearestOnE
     let length = length_squared.sqrt().max(f64::MIN_POSITIVE);
     let inner_normal = [-along[1] / length, along[0] / length];
     NearestOnEdge { distance: distance(point, nearest), point: nearest, inner_normal }
+}
+
+/// Twice the signed area of the triangle `abc`: positive where the way from a over b to c turns left.
+pub(crate) fn turn(a: [f64; 2], b: [f64; 2], c: [f64; 2]) -> f64 {
+    cross(minus(b, a), minus(c, a))
 }
 
 pub(crate) fn minus(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
@@ -61,13 +74,14 @@ pub(crate) fn bounding_box(points: &[[f64; 2]]) -> [[f64; 2]; 2] {
 
 /// Whether a point lies inside a closed polygon (even–odd rule).
 pub(crate) fn ring_contains(points: &[[f64; 2]], [x, y]: [f64; 2]) -> bool {
-    let crosses = |[a, b]: &[[f64; 2]; 2]| {
-        (a[1] > y) != (b[1] > y) && {
-            let side = cross(minus(*b, *a), minus([x, y], *a));
-            (side > 0.0) == (b[1] > a[1])
-        }
-    };
+    let crosses = |[a, b]: &[[f64; 2]; 2]| (a[1] > y) != (b[1] > y) && (turn(*a, *b, [x, y]) > 0.0) == (b[1] > a[1]);
     sides(points).filter(crosses).count() % 2 == 1
+}
+
+/// Whether a point lies inside a closed polygon or on its border, to round-off.
+pub(crate) fn contains_or_touches(points: &[[f64; 2]], point: [f64; 2]) -> bool {
+    let reach = 1e-12 * (1.0 + point[0].abs() + point[1].abs());
+    ring_contains(points, point) || sides(points).any(|side| distance_to_segment(point, side) <= reach)
 }
 
 /// Two sides of a closed polygon that cross or touch, neighbours in their common corner excepted.
@@ -111,7 +125,7 @@ fn sides_touch(a: [[f64; 2]; 2], b: [[f64; 2]; 2], tolerance: f64) -> bool {
     if (0..2).any(|i| a_low[i] > b_high[i] + tolerance || b_low[i] > a_high[i] + tolerance) {
         return false;
     }
-    let side_of = |s: [[f64; 2]; 2], p| cross(minus(s[1], s[0]), minus(p, s[0]));
+    let side_of = |[from, to]: [[f64; 2]; 2], point| turn(from, to, point);
     let crosses = side_of(a, b[0]) * side_of(a, b[1]) < 0.0 && side_of(b, a[0]) * side_of(b, a[1]) < 0.0;
     let near = |s, p| nearest_on_side(s, p).distance <= tolerance;
     crosses || near(a, b[0]) || near(a, b[1]) || near(b, a[0]) || near(b, a[1])

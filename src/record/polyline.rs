@@ -1,5 +1,7 @@
 //! Polylines reduced to what is visible (Douglas & Peucker 1973).
 
+use crate::numerics::polygon::distance_to_segment;
+
 /// The points of a polyline that are needed to stay within `tolerance` (same unit as the points) of every point of it;
 /// the first and the last are kept. Points that are not finite are left out first.
 pub fn simplify(points: &[[f64; 2]], tolerance: f64) -> Vec<[f64; 2]> {
@@ -23,25 +25,12 @@ pub fn simplify(points: &[[f64; 2]], tolerance: f64) -> Vec<[f64; 2]> {
 fn farthest_beyond(points: &[[f64; 2]], start: usize, end: usize, tolerance: f64) -> Option<usize> {
     let mut farthest = (tolerance, None);
     for index in start + 1..end {
-        let distance = distance_to_segment(points[index], points[start], points[end]);
+        let distance = distance_to_segment(points[index], [points[start], points[end]]);
         if distance > farthest.0 {
             farthest = (distance, Some(index));
         }
     }
     farthest.1
-}
-
-/// The distance of a point from the segment between two points.
-pub fn distance_to_segment(point: [f64; 2], start: [f64; 2], end: [f64; 2]) -> f64 {
-    let along = [end[0] - start[0], end[1] - start[1]];
-    let from_start = [point[0] - start[0], point[1] - start[1]];
-    let squared = along[0] * along[0] + along[1] * along[1];
-    let share = if squared > 0.0 {
-        ((from_start[0] * along[0] + from_start[1] * along[1]) / squared).clamp(0.0, 1.0)
-    } else {
-        0.0
-    };
-    (from_start[0] - share * along[0]).hypot(from_start[1] - share * along[1])
 }
 
 #[cfg(test)]
@@ -65,7 +54,7 @@ mod tests {
         assert!(simple.len() < 40, "{}", simple.len());
         for &point in &wave {
             let nearest =
-                simple.windows(2).map(|ends| distance_to_segment(point, ends[0], ends[1])).fold(f64::MAX, f64::min);
+                simple.windows(2).map(|ends| distance_to_segment(point, [ends[0], ends[1]])).fold(f64::MAX, f64::min);
             assert!(nearest <= 0.2 + 1e-12, "{nearest}");
         }
     }

@@ -5,8 +5,9 @@ use std::collections::BTreeSet;
 use super::scene::{Births, Direction, Heading, Method, Origin, Outline, Population, Ring, Scene, Tissue};
 use super::suggest::advice;
 use crate::model::quantity::{Time, format_number};
-use crate::model::shape::{Shape, check_ring, coordinates, distance_to_segment, polygon_contains, segments};
+use crate::model::shape::{Shape, check_ring, coordinates};
 use crate::model::violation::{Violations, pointer_token};
+use crate::numerics::polygon::{contains_or_touches, distance_to_segment, sides};
 
 /// A run of more steps than this would not end.
 const MOST_STEPS: f64 = 1e9;
@@ -81,7 +82,7 @@ fn check_tissue(tissue: &Tissue, violations: &mut Violations) {
         for (index, hole) in holes.iter().enumerate() {
             let pointer = format!("/tissue/outline/polygon/holes/{index}");
             check_named_ring(hole, &pointer, &mut found);
-            let outside = hole.coordinates().iter().position(|&point| !polygon_contains(&border, point));
+            let outside = hole.coordinates().iter().position(|&point| !contains_or_touches(&border, point));
             if let Some(point) = outside {
                 found.push(format!("{pointer}/points/{point}"), "the hole reaches out of the outer border");
             }
@@ -169,10 +170,10 @@ pub(super) fn check_region(
 fn is_inside(outline: &Outline, point: [f64; 2]) -> bool {
     let in_hole = |hole: &Ring| {
         let ring = hole.coordinates();
-        let on_border = segments(&ring).any(|(a, b)| distance_to_segment(point, a, b) == 0.0);
-        !on_border && polygon_contains(&ring, point)
+        let on_border = sides(&ring).any(|side| distance_to_segment(point, side) == 0.0);
+        !on_border && contains_or_touches(&ring, point)
     };
-    polygon_contains(&outline.outer().coordinates(), point) && !outline.holes().iter().any(in_hole)
+    contains_or_touches(&outline.outer().coordinates(), point) && !outline.holes().iter().any(in_hole)
 }
 
 /// Points of a disc's rim that are looked at.

@@ -6,7 +6,8 @@ use serde::{Deserialize, Serialize};
 use super::outline_file::FiledOutline;
 use crate::keys;
 use crate::model::quantity::{Angle, Factor, Length};
-use crate::model::shape::{Point, coordinates, signed_area};
+use crate::model::shape::{Point, coordinates};
+use crate::numerics::polygon::signed_area;
 
 keys! {
     /// The tissue at rest and its mesh.

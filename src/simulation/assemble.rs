@@ -21,8 +21,8 @@ use crate::model::stopwatch::Stopwatch;
 use crate::model::tissue::{Configuration, Tissue};
 use crate::model::violation::Violation;
 use crate::numerics::mesh_grading::{Grading, MOST_LEVELS};
-use crate::numerics::planar_domain::{Outline, PlanarDomain, Ring};
-use crate::numerics::triangulate::{MeshOptions, TriangulationError, triangulate_graded};
+use crate::numerics::planar_domain::{PlanarDomain, Ring};
+use crate::numerics::triangulate::{MeshOptions, TriangulationError};
 use crate::numerics::turning::derived;
 use crate::scenario::load::{Loaded, facts};
 use crate::scenario::scene::{self, Scene};
@@ -211,21 +211,19 @@ impl Meshing<'_> {
     fn fitted(&self, grading: &Grading) -> Result<Tissue, AssemblyError> {
         let keys = &self.scene.tissue;
         let domain = domain(&keys.outline);
-        let outlines: Vec<Outline> = self.named.iter().map(|(_, _, shape)| shape.outline(grading)).collect();
         let options = MeshOptions {
             size: keys.mesh_size.0,
             min_angle: keys.min_angle.radians(),
             max_vertices: keys.max_vertices as usize,
         };
-        let fitted = triangulate_graded(&domain, &outlines, &options, grading).map_err(|error| match error {
+        let shapes = self.named.iter().map(|(_, name, shape)| (name.as_str(), shape));
+        Tissue::meshed(domain, shapes, (options, grading), self.inputs).map_err(|error| match error {
             TriangulationError::OutlineOutside { outline, point } => AssemblyError::at(
                 &self.named[outline].0,
                 format!("lies outside the tissue at ({:.4}, {:.4}) um", point[0], point[1]),
             ),
             other => AssemblyError::at("/tissue", other.to_string()),
-        })?;
-        let names = self.named.iter().map(|(_, name, _)| name.clone());
-        Ok(Tissue::new(domain, fitted.mesh, names.zip(fitted.regions).collect(), self.inputs))
+        })
     }
 }
 

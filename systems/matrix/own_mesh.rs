@@ -7,30 +7,32 @@
 use crate::numerics::load_path::LoadPath;
 use crate::numerics::locate::MaterialPoint;
 use crate::numerics::mesh_grading::Grading;
-use crate::numerics::planar_domain::{Outline, PlanarDomain};
-use crate::numerics::polygon::nearest_on_side;
-use crate::numerics::simplex_mesh::BorderFacet;
-use crate::numerics::triangulate::{MeshOptions, triangulate_graded};
+use crate::numerics::planar_domain::PlanarDomain;
+use crate::numerics::triangulate::MeshOptions;
 use crate::prelude::*;
 
 /// The tissue with another mesh, evenly of `size` (µm), fitted to some outlines.
+///
+/// # Errors
+/// A mesh that cannot be made, at `/mesh_size`.
 pub fn remeshed(tissue: &Tissue, size: f64, outlines: &[(String, Shape)]) -> Result<Tissue, InstallError> {
-    let refuse = |error: String| InstallError::Scenario(Violation::new("/mesh_size", error));
-    let grading = Grading::even(size);
-    let lines: Vec<Outline> = outlines.iter().map(|(_, shape)| shape.outline(&grading)).collect();
+    let options = MeshOptions { size, ..tissue.options };
     let domain = PlanarDomain { vertices: Vec::new(), ..tissue.domain.clone() };
-    let fitted = triangulate_graded(&domain, &lines, &MeshOptions::of_size(size), &grading)
-        .map_err(|error| refuse(error.to_string()))?;
-    let names = outlines.iter().map(|(name, _)| name.clone());
-    Ok(Tissue::new(domain, fitted.mesh, names.zip(fitted.regions).collect(), &tissue.inputs))
+    let shapes = outlines.iter().map(|(name, shape)| (name.as_str(), shape));
+    Tissue::meshed(domain, shapes, (options, &Grading::even(size)), &tissue.inputs)
+        .map_err(|error| InstallError::Scenario(Violation::new("/mesh_size", error.to_string())))
 }
 
 /// What was solved on the mesh of `from`, on that of `tissue`.
 ///
 /// # Errors
-/// A cell of the tissue's mesh that the displacement at a level of the path turns over.
+/// A vertex of the tissue's mesh that lies outside by more than rounding; a cell of it that the displacement at a level of the path turns over.
 pub fn taken_over(path: &LoadPath, from: &Tissue, tissue: &Tissue) -> Result<LoadPath, InstallError> {
-    let places: Vec<MaterialPoint<2>> = tissue.mesh.vertices().iter().map(|&at| nearest(from, at)).collect();
+    let place = |&[x, y]: &[f64; 2]| {
+        let site = from.locate([x, y]).map(|site| site.planar());
+        site.ok_or_else(|| InstallError::Solve(format!("the mesh of the matrix does not reach ({x:.4}, {y:.4}) um")))
+    };
+    let places = tissue.mesh.vertices().iter().map(place).collect::<Result<Vec<MaterialPoint<2>>, _>>()?;
     let taken = path.mapped(|values| {
         let vectors: Vec<[f64; 2]> = values.chunks_exact(2).map(|u| [u[0], u[1]]).collect();
         places.iter().flat_map(|place| place.interpolate_vector(&from.mesh, &vectors)).collect()
@@ -49,25 +51,4 @@ pub fn taken_over(path: &LoadPath, from: &Tissue, tissue: &Tissue) -> Result<Loa
         }
     }
     Ok(taken)
-}
-
-/// Where a point (µm) lies in the mesh of a tissue; one outside by rounding lies on the border.
-fn nearest(tissue: &Tissue, point: [f64; 2]) -> MaterialPoint<2> {
-    if let Some(site) = tissue.locate(point) {
-        return site.planar();
-    }
-    let mesh = &tissue.mesh;
-    let place = |v: u32| mesh.vertices()[v as usize];
-    let on_facet = |facet: &BorderFacet| {
-        let ends: Vec<_> = mesh.facet_vertices(*facet).map(place).collect();
-        nearest_on_side([ends[0], ends[1]], point)
-    };
-    let found = mesh.border().iter().min_by(|a, b| on_facet(a).distance.total_cmp(&on_facet(b).distance));
-    let Some(facet) = found else { return MaterialPoint::centroid(0) };
-    let at = on_facet(facet).point;
-    let corners = mesh.cell(facet.cell as usize);
-    let [a, b, c] = [0, 1, 2].map(|i| place(corners[i]));
-    let area = |p: [f64; 2], q: [f64; 2], r: [f64; 2]| (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0]);
-    let whole = area(a, b, c);
-    MaterialPoint { cell: facet.cell, weights: [area(a, at, c) / whole, area(a, b, at) / whole] }
 }

@@ -1,7 +1,7 @@
 //! Which closed line is the outer border, and what the sides are called by the lines along them.
 
 use super::{Found, FoundRing};
-use crate::model::shape::{distance_to_segment, polygon_contains, signed_area};
+use crate::numerics::polygon::{contains_or_touches, distance_to_segment, signed_area};
 
 /// Lines name a side up to this share of the outline's extent away from it.
 const REACH: f64 = 1e-5;
@@ -19,7 +19,7 @@ pub(super) fn named(found: Found) -> Result<Vec<FoundRing>, String> {
     let area = |ring: &FoundRing| signed_area(&ring.points).abs();
     rings.sort_by(|a, b| area(b).total_cmp(&area(a)));
     let Some(outer) = rings.first() else { return Err("no closed line in it: an outline is a polygon".to_owned()) };
-    if let Some(place) = rings[1..].iter().position(|ring| !polygon_contains(&outer.points, ring.points[0])) {
+    if let Some(place) = rings[1..].iter().position(|ring| !contains_or_touches(&outer.points, ring.points[0])) {
         let [x, y] = rings[1 + place].points[0];
         return Err(format!("closed lines beside each other: the one through ({x}, {y}) lies outside of the largest"));
     }
@@ -67,7 +67,7 @@ fn extent(points: &[[f64; 2]]) -> f64 {
 }
 
 fn is_on(line: &[[f64; 2]], point: [f64; 2], reach: f64) -> bool {
-    line.windows(2).any(|ends| distance_to_segment(point, ends[0], ends[1]) <= reach)
+    line.windows(2).any(|ends| distance_to_segment(point, [ends[0], ends[1]]) <= reach)
 }
 
 #[cfg(test)]

@@ -95,7 +95,7 @@ fn casteljau(controls: &[[f64; 2]], t: f64) -> [f64; 2] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::shape::signed_area;
+    use crate::numerics::polygon::signed_area;
 
     fn drawing(inside: &str) -> String {
         format!("<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"100\" height=\"50\">{inside}</svg>")

@@ -7,8 +7,8 @@ use super::{Found, FoundRing};
 use resvg::tiny_skia::{PathSegment, Point};
 use resvg::usvg::{Group, ImageHrefResolver, Node, Options, Path, Tree};
 
-/// Sides in the place of one curve.
-const MOST_SIDES: f64 = 10_000.0;
+/// Straight sides of a whole drawing at most.
+const MOST_SIDES: usize = 100_000;
 
 /// The shapes of a drawing; `tolerance` in its units.
 pub(super) fn read(text: &str, tolerance: f64) -> Result<Found, String> {
@@ -16,15 +16,15 @@ pub(super) fn read(text: &str, tolerance: f64) -> Result<Found, String> {
     let options = Options { image_href_resolver: blind, ..Options::default() };
     let tree = Tree::from_str(text, &options).map_err(|error| error.to_string())?;
     let mut found = Found::default();
-    add(tree.root(), (f64::from(tree.size().height()), tolerance), &mut found)?;
+    add(tree.root(), (f64::from(tree.size().height()), tolerance), (&mut found, &mut 0))?;
     Ok(found)
 }
 
-fn add(group: &Group, drawing: (f64, f64), found: &mut Found) -> Result<(), String> {
+fn add(group: &Group, drawing: (f64, f64), (found, sides): (&mut Found, &mut usize)) -> Result<(), String> {
     for node in group.children() {
         match node {
-            Node::Group(inner) => add(inner, drawing, found)?,
-            Node::Path(path) => add_path(path, drawing, found)?,
+            Node::Group(inner) => add(inner, drawing, (found, sides))?,
+            Node::Path(path) => add_path(path, drawing, (found, sides))?,
             Node::Image(_) | Node::Text(_) => {}
         }
     }
@@ -32,7 +32,11 @@ fn add(group: &Group, drawing: (f64, f64), found: &mut Found) -> Result<(), Stri
 }
 
 /// Adds the parts of a path: closed ones as rings, open ones as lines.
-fn add_path(path: &Path, (height, tolerance): (f64, f64), found: &mut Found) -> Result<(), String> {
+fn add_path(
+    path: &Path,
+    (height, tolerance): (f64, f64),
+    (found, sides): (&mut Found, &mut usize),
+) -> Result<(), String> {
     let Some(placed) = path.data().clone().transform(path.abs_transform()) else { return Ok(()) };
     let upright = |point: Point| [f64::from(point.x), height - f64::from(point.y)];
     let mut points: Vec<[f64; 2]> = Vec::new();
@@ -50,17 +54,22 @@ fn add_path(path: &Path, (height, tolerance): (f64, f64), found: &mut Found) -> 
         Ok(())
     };
     for segment in placed.segments() {
+        let before = points.len();
         match segment {
             PathSegment::MoveTo(to) => {
                 end(&mut points, false)?;
                 points.push(upright(to));
             }
             PathSegment::LineTo(to) => points.push(upright(to)),
-            PathSegment::QuadTo(control, to) => curve(&mut points, &[upright(control), upright(to)], tolerance),
+            PathSegment::QuadTo(control, to) => curve(&mut points, &[upright(control), upright(to)], tolerance)?,
             PathSegment::CubicTo(one, two, to) => {
-                curve(&mut points, &[upright(one), upright(two), upright(to)], tolerance)
+                curve(&mut points, &[upright(one), upright(two), upright(to)], tolerance)?
             }
             PathSegment::Close => end(&mut points, true)?,
+        }
+        *sides += points.len().saturating_sub(before);
+        if *sides > MOST_SIDES {
+            return Err(too_many_sides());
         }
     }
     end(&mut points, false)
@@ -68,8 +77,8 @@ fn add_path(path: &Path, (height, tolerance): (f64, f64), found: &mut Found) -> 
 
 /// Adds straight pieces of a Bézier curve from the last point on. With n pieces they are at most d(d−1)M/(8n²) away, where d is the degree
 /// and M the largest second difference of the control points.
-fn curve(points: &mut Vec<[f64; 2]>, controls: &[[f64; 2]], tolerance: f64) {
-    let Some(&start) = points.last() else { return };
+fn curve(points: &mut Vec<[f64; 2]>, controls: &[[f64; 2]], tolerance: f64) -> Result<(), String> {
+    let Some(&start) = points.last() else { return Ok(()) };
     let all: Vec<[f64; 2]> = std::iter::once(start).chain(controls.iter().copied()).collect();
     let degree = (all.len() - 1) as f64;
     let bend = |three: &[[f64; 2]]| {
@@ -77,8 +86,16 @@ fn curve(points: &mut Vec<[f64; 2]>, controls: &[[f64; 2]], tolerance: f64) {
         second(0).hypot(second(1))
     };
     let most = all.windows(3).map(bend).fold(0.0, f64::max);
-    let pieces = (degree * (degree - 1.0) * most / (8.0 * tolerance)).sqrt().ceil().clamp(1.0, MOST_SIDES);
+    let pieces = (degree * (degree - 1.0) * most / (8.0 * tolerance)).sqrt().ceil().max(1.0);
+    if pieces > MOST_SIDES as f64 {
+        return Err(too_many_sides());
+    }
     points.extend((1..=pieces as usize).map(|i| casteljau(&all, i as f64 / pieces)));
+    Ok(())
+}
+
+fn too_many_sides() -> String {
+    format!("its curves would become more than {MOST_SIDES} straight sides; a larger tolerance makes fewer")
 }
 
 /// The point of a Bézier curve at t ∈ [0, 1].
@@ -128,6 +145,14 @@ mod tests {
             assert!(worst < tolerance + 6e-3, "{worst}");
             let area = signed_area(points).abs();
             assert!((area / (std::f64::consts::PI * 400.0) - 1.0).abs() < 0.1 * tolerance.sqrt(), "{area}");
+        }
+    }
+
+    #[test]
+    fn curves_that_need_more_sides_than_memory_should_hold_are_refused() {
+        for radius in ["1e9", "14444444444444444444444440"] {
+            let circle = drawing(&format!("<g transform='rotate(10)'><circle cx='45' cy='25' r='{radius}'/></g>"));
+            assert!(read(&circle, 1e-6).unwrap_err().contains("a larger tolerance"), "{radius}");
         }
     }
 

@@ -2,8 +2,8 @@
 //!
 //! One pass over the columns tells which segments are felt; those are copied together in batches, whole ones before those that
 //! the sector cuts, and a second pass integrates and sums them. Both passes run in the widest vector registers that the
-//! processor has; since every segment is treated by itself with the same operations, and sums are taken in a fixed number of
-//! lanes, the bits do not depend on that width. The order of a sum depends only on the segments that are felt.
+//! processor has; every segment is treated by itself with the same operations, and what it gives is rounded to a multiple of
+//! 2⁻⁴⁰ (10⁻¹², where a full pull is 1) so that sums are exact. So the bits depend neither on that width nor on the order of segments.
 
 use super::contact_integral::{Felt, Sight, View};
 use pulp::{Arch, Simd, WithSimd};
@@ -102,7 +102,7 @@ pub struct Touch<const D: usize> {
     pub along: f64,
 }
 
-/// Partial sums; the order of summation depends on this number, never on the width of registers.
+/// Partial sums.
 const LANES: usize = 8;
 const _: () = assert!(BATCH.is_multiple_of(LANES));
 
@@ -275,7 +275,7 @@ impl<const D: usize, const WHOLE: bool, L: ContactPull<D>> WithSimd for Integrat
             let moments = if WHOLE { felt.moments_within_reach(&sight) } else { felt.moments_within_sector(&sight) };
             let of_touch = law.pull(&Touch { normal, tangent, moments, along: sight.along });
             for k in 0..D {
-                pull[k][i] = of_touch[k] * adhesion[i];
+                pull[k][i] = on_grid(of_touch[k] * adhesion[i]);
             }
         }
         for (sums, pull) in sums.iter_mut().zip(pull) {
@@ -286,6 +286,14 @@ impl<const D: usize, const WHOLE: bool, L: ContactPull<D>> WithSimd for Integrat
             }
         }
     }
+}
+
+/// The multiple of 2⁻⁴⁰ that is nearest to a number below 2048: sums of such are exact below 8192, and so the same in any order.
+#[inline(always)]
+fn on_grid(x: f64) -> f64 {
+    // From here to its double, numbers that can be told apart lie 2⁻⁴⁰ apart.
+    const SHIFT: f64 = 6144.0;
+    (x + SHIFT) - SHIFT
 }
 
 /// A segment as the cone at `x` with heading `e` sees it, and the vector n to its line.

@@ -1,8 +1,8 @@
 //! Whether `"accuracy"` keeps what it says, and at what price: `cargo bench --bench accuracy`.
 //!
 //! Each scene is settled as a run would settle it. The error that is reached is measured over all axons of the scene
-//! without contact and noise, against a reference of a quarter of the mesh size (no more than 100 000 vertices) and a
-//! sixteenth of the step. The price is the time of assembly and run at the choice over that of the cheapest of a grid
+//! without contact and noise, against a reference of a quarter of the mesh size (at most a 48th of the tissue's smaller
+//! side, no more than 100 000 vertices) and a sixteenth of the step (1024 steps or more). The price is the time of assembly and run at the choice over that of the cheapest of a grid
 //! of fixed settings that meets the same accuracy against the same reference: mesh sizes in ratios of √2, four of
 //! them coarser than the choice and two finer, each with steps in ratios of 2 from 32 times the choice's down to a
 //! quarter of it. Seconds are CPU time of one thread, median of three; two scenes at a time, each on a thread of its
@@ -27,6 +27,9 @@ use tropism::systems;
 const REPETITIONS: usize = 3;
 /// Vertices of a reference at most.
 const MOST_VERTICES: f64 = 1e5;
+/// Cells along the tissue's smaller side and steps of a reference at least.
+const REFERENCE_CELLS: f64 = 48.0;
+const REFERENCE_STEPS: f64 = 1024.0;
 /// Mesh sizes of the grid, as powers of √2 of the choice, coarse ones first.
 const MESHES: std::ops::RangeInclusive<i32> = -2..=4;
 /// Steps of the grid, as powers of 2 of the choice.
@@ -234,12 +237,14 @@ impl Bench<'_> {
         let corner = &outline["polygon"]["outer"]["points"][2];
         let side = |name: &str, k: usize| outline["rectangle"][name].as_f64().or(corner[k].as_f64()).expect("a side");
         let finest = (1.155 * side("width", 0) * side("height", 1) / MOST_VERTICES).sqrt();
-        let mesh = (chosen.mesh / 4.0).max(finest);
+        let coarsest = side("width", 0).min(side("height", 1)) / REFERENCE_CELLS;
+        let mesh = (chosen.mesh / 4.0).min(coarsest).max(finest);
+        let step = (chosen.step / 16.0).min(self.duration / REFERENCE_STEPS);
         let more: Vec<String> = match scene.get("matrix") {
             Some(_) => vec![format!("/matrix/tolerance={:e}", 1e-4 * asked), "/matrix/mesh_size=null".to_owned()],
             None => Vec::new(),
         };
-        Ok((self.run(Fixed { mesh, step: chosen.step / 16.0 }, &more)?.0, chosen.mesh / mesh))
+        Ok((self.run(Fixed { mesh, step }, &more)?.0, chosen.mesh / mesh))
     }
 
     /// The cheapest fixed setting that can be run and meets the accuracy; the choice itself if none is cheaper.

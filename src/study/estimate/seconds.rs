@@ -4,7 +4,7 @@
 //! are good for a third each way there; other machines are slower or faster as a whole.
 
 use super::{Estimate, Expectation, done};
-use crate::model::plan::{Plan, Work};
+use crate::model::plan::{Each, Plan, Work};
 use crate::model::tissue::Tissue;
 use bevy_ecs::prelude::World;
 
@@ -57,4 +57,40 @@ pub fn estimate(world: &World, expected: &Expectation) -> Estimate {
     }
     estimate.parts.iter_mut().for_each(|part| part.amount /= SECOND);
     estimate.summed()
+}
+
+/// What a scene takes for the run and for each of what there are many of (ns of one thread), to compare settings by before it is known
+/// how many there will be. Axons and stored vertices, the same with all settings, are left out.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Rates {
+    /// The run, Newton's method left out.
+    pub run: f64,
+    /// Newton's method.
+    pub newton: f64,
+    /// A step of the clock.
+    pub step: f64,
+    /// A stage of the integrator.
+    pub stage: f64,
+    /// A growing cone at a stage.
+    pub cone_stage: f64,
+}
+
+impl Rates {
+    /// Of a scene that was put together.
+    pub fn of(world: &World) -> Self {
+        let mesh = MESH_VERTEX * world.resource::<Tissue>().mesh.vertex_count() as f64;
+        let mut rates = Self { run: START + mesh, step: STEP, cone_stage: CONE_STAGE, ..Self::default() };
+        for task in &world.resource::<Plan>().tasks {
+            let time = task.amount * unit(task.work);
+            match (task.each, task.work) {
+                (Each::Run, Work::NewtonUnknown) => rates.newton += time,
+                (Each::Run, _) => rates.run += time,
+                (Each::Step, _) => rates.step += time,
+                (Each::Stage, _) => rates.stage += time,
+                (Each::ConeStage, _) => rates.cone_stage += time,
+                (Each::Axon | Each::ShaftVertex, _) => {}
+            }
+        }
+        rates
+    }
 }

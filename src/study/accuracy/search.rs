@@ -1,0 +1,269 @@
+//! The search for the cheapest step and mesh sizes.
+
+use super::sequence::{Cost, Pilot, Sequence, errors, stagnates};
+use super::{Found, difference, given};
+use crate::model::plan::Plan;
+use crate::model::tissue::Configuration;
+use crate::scenario::load::Loaded;
+use crate::study::estimate::seconds::Rates;
+use crate::study::laboratory::{Laboratory, chaotic, cones, few_axons, run_until};
+use crate::study::run::RunError;
+
+/// What one part of the error may come to where its sequence ends, over the accuracy asked for.
+const SHARE: f64 = 0.4;
+/// What both parts may come to for a pair to be tried, and what one run may then show: less where pilots have not all
+/// axons.
+const TRIED: f64 = 4.0;
+const TAKEN: f64 = 1.0;
+const TAKEN_OF_SOME: f64 = 0.9;
+/// By how much a mesh of the matrix' own may move tips, over the accuracy asked for.
+const BY_MATRIX: f64 = 0.2;
+/// Pairs tried at most.
+const MOST_TRIALS: usize = 128;
+/// Tolerance of the load path over the accuracy.
+const LEVELS: f64 = 1e-3;
+/// Axons of a population in a pilot.
+const PILOT_AXONS: u64 = 200;
+/// The mesh with which refinement begins: this share of the tissue's smaller extent.
+const COARSEST_MESH: f64 = 1.0 / 6.0;
+/// Place in the sequence of meshes of the one on which steps are judged.
+const MESH_FOR_STEPS: i32 = 2;
+/// Steps of the clock with which refinement begins.
+const FEWEST_STEPS: f64 = 16.0;
+/// Places before those, coarser ones, that may be chosen.
+const COARSER_MESHES: i32 = 3;
+const COARSER_STEPS: i32 = 2;
+/// Refinements of each kind at most.
+const MOST_REFINEMENTS: i32 = 14;
+/// A mesh of more vertices than this is not tried.
+const MOST_VERTICES: f64 = 1e5;
+
+pub struct Search<'a> {
+    laboratory: &'a Laboratory<'a>,
+    scene: &'a Loaded,
+    /// Mesh size (µm); none where the scene's own is kept.
+    mesh: Option<f64>,
+    /// Mesh size of the matrix (µm); none where it is that of the tissue, or the scene's own.
+    matrix_mesh: Option<f64>,
+    /// Step (h).
+    step: f64,
+    pilots: usize,
+    asked: f64,
+}
+
+/// The whole scene, contact and noise included.
+struct Whole {
+    /// The longest step that passes no limit of its plan (h).
+    longest_step: f64,
+    /// What a cone takes at a stage (ns).
+    cone: f64,
+    /// Share of its axons that pilots have.
+    share: f64,
+}
+
+/// A run with the finest of both, and a bound of its own error, which is taken to be independent of that of others.
+struct Judge {
+    finest: Pilot,
+    tail: f64,
+}
+
+impl Judge {
+    fn error(&self, pilot: &Pilot) -> f64 {
+        difference(&pilot.tips, &self.finest.tips).hypot(self.tail)
+    }
+}
+
+/// A mesh for the matrix alone (µm), and what Newton's method takes on it (ns).
+#[derive(Clone, Copy)]
+struct MatrixMesh {
+    size: f64,
+    newton: f64,
+}
+
+impl<'a> Search<'a> {
+    pub fn new(laboratory: &'a Laboratory<'a>, scene: &'a Loaded, asked: f64) -> Self {
+        Self { laboratory, scene, mesh: None, matrix_mesh: None, step: scene.scene.time.step.0, pilots: 0, asked }
+    }
+
+    /// Searches for what is not given of step and mesh size.
+    ///
+    /// # Errors
+    /// A scene that cannot be assembled or run.
+    pub fn found(mut self, (step_given, mesh_given): (bool, bool)) -> Result<Found, RunError> {
+        self.mesh = (!mesh_given).then(|| self.mesh_size(MESH_FOR_STEPS));
+        if !step_given {
+            self.step = self.scene.scene.time.duration.0 / FEWEST_STEPS;
+        }
+        let whole = self.whole()?;
+        let steps = if step_given { Sequence::fixed(self.step) } else { self.refined_steps(whole.longest_step)? };
+        self.step = steps.values[steps.settled];
+        let meshes = if mesh_given { Sequence::fixed(0.0) } else { self.refined_meshes()? };
+        let (step, mesh, estimated) = self.cheapest(&steps, &meshes, &whole)?;
+        let (by_step, by_mesh) = (steps.errors[step], meshes.errors[mesh]);
+        let mut set = self.keys();
+        set.push("/accuracy=null".to_owned());
+        let (asked, met) = (self.asked, estimated <= self.asked);
+        Ok(Found { asked, estimated, by_step, by_mesh, met, set, pilots: self.pilots })
+    }
+
+    fn keys(&self) -> Vec<String> {
+        let mut keys = vec![format!("/time/step={:e}", self.step)];
+        keys.extend(self.mesh.map(|size| format!("/tissue/mesh_size={size:e}")));
+        if self.scene.blocks.contains_key("matrix") && !given(self.scene, "/matrix/tolerance") {
+            keys.push(format!("/matrix/tolerance={:e}", (LEVELS * self.asked).clamp(1e-9, 1e-3)));
+        }
+        keys.extend(self.matrix_mesh.map(|size| format!("/matrix/mesh_size={size:e}")));
+        keys
+    }
+
+    fn extent(&self) -> [f64; 2] {
+        let points = self.scene.scene.tissue.outline.outer().coordinates();
+        [0, 1].map(|k| {
+            let ends = points.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |e, p| [e[0].min(p[k]), e[1].max(p[k])]);
+            ends[1] - ends[0]
+        })
+    }
+
+    /// Size of a place in the sequence of meshes (µm).
+    fn mesh_size(&self, place: i32) -> f64 {
+        let [width, height] = self.extent();
+        COARSEST_MESH * width.min(height) * 0.5f64.powf(0.5 * f64::from(place))
+    }
+
+    fn whole(&self) -> Result<Whole, RunError> {
+        let simulation = self.laboratory.assemble(&self.laboratory.load(&[], &self.keys())?)?;
+        let world = simulation.world();
+        let of_step = world.resource::<Plan>().margins.iter().filter(|margin| margin.advice.contains("step"));
+        let worst =
+            of_step.filter(|margin| margin.limit > 0.0).map(|margin| margin.value / margin.limit).fold(0.0, f64::max);
+        let populations = self.scene.scene.populations.values().map(|population| population.count);
+        let (all, few) = populations.fold((0, 0), |(all, few), count| (all + count, few + count.min(PILOT_AXONS)));
+        let share = if all > 0 { few as f64 / all as f64 } else { 1.0 };
+        Ok(Whole { longest_step: self.step / worst, cone: Rates::of(world).cone_stage, share })
+    }
+
+    fn refined_steps(&mut self, longest: f64) -> Result<Sequence, RunError> {
+        let halvings = (self.step / longest).log2().ceil().max(0.0);
+        let start = self.step / 2f64.powf(halvings);
+        self.refined(COARSER_STEPS, |search, place| {
+            search.step = start * 0.5f64.powi(place);
+            (search.step <= longest).then_some(search.step)
+        })
+    }
+
+    fn refined_meshes(&mut self) -> Result<Sequence, RunError> {
+        self.refined(COARSER_MESHES, |search, place| {
+            let ([width, height], size) = (search.extent(), search.mesh_size(place));
+            search.mesh = Some(size);
+            (1.155 * width * height <= MOST_VERTICES * size * size).then_some(size)
+        })
+    }
+
+    /// Refines until the errors at two places in a row are small, or no refinement helps or can be afforded; places
+    /// below nought are coarser ones, and left out where they cannot be run. `set` puts a place and returns its value,
+    /// if it may be had.
+    fn refined(
+        &mut self,
+        coarser: i32,
+        mut set: impl FnMut(&mut Self, i32) -> Option<f64>,
+    ) -> Result<Sequence, RunError> {
+        let goal = SHARE * self.asked;
+        let (mut values, mut pilots, mut changes) = (Vec::new(), Vec::new(), Vec::new());
+        for place in -coarser..0 {
+            if let Some(value) = set(self, place)
+                && let Ok(pilot) = self.pilot()
+            {
+                values.push(value);
+                pilots.push(pilot);
+            }
+        }
+        let first = pilots.len();
+        for place in 0..=MOST_REFINEMENTS {
+            let Some(value) = set(self, place) else { break };
+            let pilot = self.pilot()?;
+            if let Some(before) = pilots[first..].last() {
+                changes.push(difference(&before.tips, &pilot.tips));
+            }
+            values.push(value);
+            pilots.push(pilot);
+            let refined = errors(&pilots[first..]);
+            let settled =
+                refined.len() >= 3 && refined[refined.len() - 3..refined.len() - 1].iter().all(|error| *error <= goal);
+            if settled || stagnates(&changes) {
+                break;
+            }
+        }
+        Ok(Sequence::of(values, &pilots, goal))
+    }
+
+    fn put(&mut self, steps: &Sequence, step: usize, meshes: &Sequence, mesh: usize) {
+        self.step = steps.values[step];
+        self.mesh = self.mesh.map(|_| meshes.values[mesh]);
+    }
+
+    /// Puts the cheapest pair that meets the accuracy by one run with the finest of both, or, if there is none, the pair
+    /// where the sequences settled. Returns its places and its error.
+    fn cheapest(
+        &mut self,
+        steps: &Sequence,
+        meshes: &Sequence,
+        whole: &Whole,
+    ) -> Result<(usize, usize, f64), RunError> {
+        let taken = if whole.share < 1.0 { TAKEN_OF_SOME } else { TAKEN };
+        let both = |i: usize, j: usize| steps.errors[i].hypot(meshes.errors[j]);
+        let (step, mesh) = (steps.settled, meshes.settled);
+        let places = |sequence: &Sequence| 0..sequence.errors.len();
+        let all = places(steps).flat_map(|i| places(meshes).map(move |j| (i, j)));
+        let mut pairs: Vec<_> = all.filter(|&(i, j)| both(i, j) <= TRIED * self.asked).collect();
+        if steps.finest() + meshes.finest() > 0 && !pairs.is_empty() {
+            self.put(steps, steps.finest(), meshes, meshes.finest());
+            let judge = Judge { finest: self.pilot()?, tail: steps.tail.hypot(meshes.tail) };
+            let matrix = self.coarser_matrix(&judge);
+            let time = |&(i, j): &(usize, usize)| {
+                let mesh = meshes.costs[j].rates;
+                let newton = matrix.map_or(mesh.newton, |matrix| matrix.newton.min(mesh.newton));
+                steps.costs[i].on(&Rates { newton, ..mesh }, whole.cone / whole.share)
+            };
+            pairs.sort_by(|a, b| time(a).total_cmp(&time(b)));
+            for (step, mesh) in pairs.into_iter().take(MOST_TRIALS) {
+                self.put(steps, step, meshes, mesh);
+                self.matrix_mesh =
+                    matrix.map(|matrix| matrix.size).filter(|size| self.mesh.is_some_and(|mesh| *size > mesh));
+                // A mesh on which there is no equilibrium is none to take.
+                let error = self.pilot().map_or(f64::INFINITY, |pilot| judge.error(&pilot));
+                if error <= taken * self.asked {
+                    return Ok((step, mesh, error));
+                }
+            }
+            self.matrix_mesh = None;
+        }
+        self.put(steps, step, meshes, mesh);
+        Ok((step, mesh, both(step, mesh)))
+    }
+
+    /// The coarsest mesh for the matrix alone that moves tips by little; none where the scene has its own, or nothing moves.
+    fn coarser_matrix(&mut self, judge: &Judge) -> Option<MatrixMesh> {
+        let free = self.scene.blocks.contains_key("matrix") && !given(self.scene, "/matrix/mesh_size");
+        let finest = self.mesh.filter(|_| free && judge.finest.moves)?;
+        let sizes = std::iter::successors(Some(self.mesh_size(0)), |size| Some(0.5 * size));
+        let found = sizes.take_while(|size| *size >= 2.0 * finest).find_map(|size| {
+            self.matrix_mesh = Some(size);
+            let pilot = self.pilot().ok()?;
+            let near = difference(&pilot.tips, &judge.finest.tips) <= BY_MATRIX * self.asked;
+            near.then_some(MatrixMesh { size, newton: pilot.cost.rates.newton })
+        });
+        self.matrix_mesh = None;
+        found
+    }
+
+    fn pilot(&mut self) -> Result<Pilot, RunError> {
+        self.pilots += 1;
+        let without = chaotic(self.scene);
+        let mut set = self.keys();
+        set.extend(few_axons(self.scene, PILOT_AXONS));
+        let mut simulation = self.laboratory.assemble(&self.laboratory.load(&without, &set)?)?;
+        run_until(&mut simulation, self.scene.scene.time.duration.0)?;
+        let (tips, world) = (cones(&simulation), simulation.world());
+        Ok(Pilot { tips, cost: Cost::of(world), moves: world.resource::<Configuration>().moves })
+    }
+}

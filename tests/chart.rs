@@ -28,7 +28,8 @@ fn scene() -> Value {
 fn charted(scene: &Value, only: &[&str]) -> Chart {
     let folder = Folder::new();
     let request = Request { path: folder.write("scene.json", &scene.to_string()), ..Request::default() };
-    let laboratory = Laboratory { request: &request, roster: &systems::standard(), repetitions: 2, seeds: 2 };
+    let roster = systems::standard();
+    let laboratory = Laboratory { repetitions: 2, seeds: 2, ..Laboratory::new(&request, &roster) };
     let only: Vec<String> = only.iter().map(|&name| name.to_owned()).collect();
     chart(&laboratory, &only, &|_| {}).unwrap()
 }

@@ -377,6 +377,11 @@ fn the_room_of_a_run_can_be_said_and_a_refused_run_writes_no_results() {
     assert_eq!(code(&output), 2, "{}", errors(&output));
     assert!(errors(&output).contains("for 64 runs at once"), "{}", errors(&output));
     assert_eq!(code(&with("60", &[])), 2, "a size has a unit");
+    let load = concat!(env!("CARGO_MANIFEST_DIR"), "/scenarios/load.json");
+    let output = tropism(&folder, &["bench", load, "--axons", "100,100000000", "--memory", "10GB", "--out", "bench"]);
+    assert_eq!(code(&output), 2, "{}", errors(&output));
+    let words = "with /parameters/axons=100000000 does not fit into memory";
+    assert!(errors(&output).contains(words), "{}", errors(&output));
     let output = tropism(&folder, &["plan", "scene.json", "--memory", "1MB"]);
     assert_eq!(code(&output), 0);
     assert!(errors(&output).contains("does not fit into memory"), "{}", errors(&output));

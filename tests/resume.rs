@@ -6,6 +6,7 @@ mod common;
 use common::{Folder, hash_of_states, loaded};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
+use std::process::Command;
 use tropism::model::keep::{Keep, KeptBytes};
 use tropism::record::checkpoint::{Checkpoint, NAMES, paths};
 use tropism::record::scene_view::scene_figure;
@@ -329,6 +330,17 @@ fn a_checkpoint_of_another_scenario_is_refused() {
     std::fs::rename(previous, newest).unwrap();
     let words = refusal(&folder);
     assert!(words.contains("does not fit: `identities`: 12 growth cones instead of 16"), "{words}");
+}
+
+#[test]
+fn a_run_that_does_not_fit_into_memory_any_more_is_not_gone_on_with() {
+    let (folder, ..) = with_checkpoints();
+    let before = paths(&folder.0).map(|path| std::fs::read(path).unwrap());
+    let program = Command::new(env!("CARGO_BIN_EXE_tropism"));
+    let output = { program }.arg("resume").arg(&folder.0).args(["--memory", "1MB"]).output().unwrap();
+    let words = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.code() == Some(2) && words.contains("does not fit into memory"), "{words}");
+    assert!(paths(&folder.0).map(|path| std::fs::read(path).unwrap()) == before, "nothing is lost");
 }
 
 #[test]

@@ -1,6 +1,7 @@
 //! A scene with some keys changed, put together and timed again and again.
 
 use super::chart::work_precision::{Point, Seconds};
+use super::room::Room;
 use super::run::{RunError, assembled, read};
 use crate::model::components::{GrowthCone, Journey, Site, SpringState};
 use crate::model::mechanism::Roster;
@@ -23,6 +24,8 @@ pub struct Laboratory<'a> {
     pub repetitions: usize,
     /// Seeds for the measures of whole scenes.
     pub seeds: u64,
+    /// The memory that a run may take.
+    pub room: Room,
 }
 
 /// One setting: a method with its knob, and the keys that make it.
@@ -70,7 +73,7 @@ pub struct ConeView {
 impl<'a> Laboratory<'a> {
     /// A laboratory that times nothing twice.
     pub fn new(request: &'a Request, roster: &'a Roster) -> Self {
-        Self { request, roster, repetitions: 1, seeds: 1 }
+        Self { request, roster, repetitions: 1, seeds: 1, room: Room::default() }
     }
 
     /// The scene as it is.

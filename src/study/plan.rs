@@ -70,10 +70,7 @@ pub fn plan_of(simulation: &Simulation, loaded: &Loaded) -> Result<ScenePlan, Ru
     let world: &World = simulation.world();
     let clock = *world.resource::<Clock>();
     let lifetimes = lifetimes(world, &clock);
-    let interval = clock.grid.nearest(loaded.scene.output.trajectory_interval.0).max(1);
-    let points = lifetimes.iter().map(|ticks| ticks / interval + 1).sum();
-    let recorder = Recorder::new(&recorder_options(loaded, Records::ALL), &clock.grid, clock.end);
-    let expected = Expectation::of(world, &recorder, points);
+    let (expected, recorder) = expected_of(world, loaded, Records::ALL);
     let mesh = &world.resource::<Tissue>().mesh;
     let mut plan = world.resource::<Plan>().clone();
     tell_outputs(&mut plan, loaded, &recorder);
@@ -85,13 +82,31 @@ pub fn plan_of(simulation: &Simulation, loaded: &Loaded) -> Result<ScenePlan, Ru
         mesh_cells: mesh.cell_count(),
         steps: clock.end.div_ceil(clock.grid.step_ticks()),
         cone_steps_at_most: lifetimes.iter().map(|ticks| ticks.div_ceil(clock.grid.step_ticks())).sum(),
-        trajectory_points_at_most: points,
+        trajectory_points_at_most: expected.trajectory_points as u64,
         solved: simulation.counters(),
         memory_mb: memory::estimate(world, &expected, scale_for_dpi(DPI).into())?,
         cpu_seconds: seconds::estimate(world, &expected),
         expected,
         notes: world.resource::<Health>().notes().to_vec(),
     })
+}
+
+/// The memory (MB) that goes on with, or begins, the run of a scene that has been put together, with what is kept of it.
+///
+/// # Errors
+/// A tissue without extent.
+pub fn memory_of(simulation: &Simulation, loaded: &Loaded, keep: Records) -> Result<Estimate, RunError> {
+    let (expected, _) = expected_of(simulation.world(), loaded, keep);
+    Ok(memory::estimate(simulation.world(), &expected, scale_for_dpi(DPI).into())?)
+}
+
+fn expected_of(world: &World, loaded: &Loaded, keep: Records) -> (Expectation, Recorder) {
+    let clock = world.resource::<Clock>();
+    let interval = clock.grid.nearest(loaded.scene.output.trajectory_interval.0).max(1);
+    let lifetimes = if keep.trajectories { lifetimes(world, clock) } else { Vec::new() };
+    let points = lifetimes.iter().map(|ticks| ticks / interval + 1).sum();
+    let recorder = Recorder::new(&recorder_options(loaded, keep), &clock.grid, clock.end);
+    (Expectation::of(world, &recorder, points), recorder)
 }
 
 /// The files that a run writes, and what for.

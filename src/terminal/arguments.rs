@@ -123,6 +123,9 @@ pub enum Command {
         /// Threads to use; results do not depend on it [default: all]
         #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1024))]
         threads: Option<u32>,
+        /// Refuse a run that needs more memory than this, e.g. 8GB, or than is `free`; `any` refuses none
+        #[arg(long, value_name = "SIZE", default_value = "free", value_parser = Room::parse)]
+        memory: Room,
     },
     /// Draws finished runs from their recordings, at any time or side by side, without running them again
     Figure(FigureArguments),

@@ -101,16 +101,19 @@ fn execute(cli: &Cli, roster: &Roster) -> Result<ExitCode, RunError> {
         }
         Some(Command::Chart { scene, out, only, repetitions, seeds, .. }) => {
             let (request, _) = scene.settled(roster)?;
-            let laboratory =
-                Laboratory { request: &request, roster, repetitions: *repetitions as usize, seeds: *seeds };
+            let (repetitions, room) = (*repetitions as usize, scene.memory);
+            let laboratory = Laboratory { request: &request, roster, repetitions, seeds: *seeds, room };
             return run_chart(cli, &laboratory, out.as_ref(), only);
         }
         Some(Command::Bench { scene, out, axons, repetitions, .. }) => {
             let (request, _) = scene.settled(roster)?;
-            let laboratory = Laboratory { request: &request, roster, repetitions: *repetitions as usize, seeds: 1 };
+            let (repetitions, room) = (*repetitions as usize, scene.memory);
+            let laboratory = Laboratory { request: &request, roster, repetitions, seeds: 1, room };
             return run_bench(&laboratory, out.as_ref(), axons);
         }
-        Some(Command::Resume { folder, checkpoint, .. }) => return resume(folder, roster, *checkpoint),
+        Some(Command::Resume { folder, checkpoint, memory, .. }) => {
+            return resume((folder, *memory), roster, *checkpoint);
+        }
         Some(Command::Figure(arguments)) => return arguments.draw(),
         Some(Command::Movie(arguments)) => return arguments.make(),
         Some(Command::Stability { out }) => return run_stability(out, roster),

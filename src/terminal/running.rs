@@ -7,7 +7,7 @@ use crate::model::mechanism::Roster;
 use crate::model::quantity::{Quantity, Time};
 use crate::record::checkpoint;
 use crate::record::output::prepare_folder;
-use crate::study::plan::plan_of;
+use crate::study::plan::memory_of;
 use crate::study::report::Asked;
 use crate::study::resume::{Checkpoints, Found, Resumed, pick_up};
 use crate::study::room::Room;
@@ -37,7 +37,7 @@ pub fn run_once(
     interval: Option<f64>,
 ) -> Result<ExitCode, RunError> {
     let mut run = Run::begin(asked.loaded, roster, path, Records::ALL)?;
-    room.admit(&asked.loaded.scene.name, &plan_of(&run.simulation, asked.loaded)?.memory_mb, 1)?;
+    room.admit(&asked.loaded.scene.name, &memory_of(&run.simulation, asked.loaded, Records::ALL)?, 1)?;
     run.writes_into(folder, asked.loaded)?;
     let mut checkpoints = Checkpoints::new(folder, interval, (asked, path));
     checkpoints.begin(&run)?;
@@ -47,8 +47,8 @@ pub fn run_once(
 /// Goes on with the run of a folder from its newest checkpoint. `interval` (s) takes the place of the run's own.
 ///
 /// # Errors
-/// A folder without a checkpoint that can be used; a file that cannot be written.
-pub fn resume(folder: &Path, roster: &Roster, interval: Option<f64>) -> Result<ExitCode, RunError> {
+/// A folder without a checkpoint that can be used; a run that does not fit into `room`; a file that cannot be written.
+pub fn resume((folder, room): (&Path, Room), roster: &Roster, interval: Option<f64>) -> Result<ExitCode, RunError> {
     let Resumed { loaded, path, command, run, interval: own, refused } = match pick_up(folder, roster)? {
         Found::Stopped(resumed) => *resumed,
         Found::Finished => {
@@ -57,6 +57,7 @@ pub fn resume(folder: &Path, roster: &Roster, interval: Option<f64>) -> Result<E
         }
     };
     refused.iter().for_each(|reason| alarm!("warning: {reason}; the one before it is used"));
+    room.admit(&loaded.scene.name, &memory_of(&run.simulation, &loaded, Records::ALL)?, 1)?;
     prepare_folder(folder)?;
     note!("{}: resumed at t = {} h", loaded.scene.name, run.simulation.time());
     let asked = Asked { loaded: &loaded, command: &command };

@@ -7,8 +7,10 @@ mod plain;
 pub mod report;
 
 use super::chart::work_precision::{Seconds, slope};
+use super::estimate::outlook::outlook;
 use super::laboratory::{Laboratory, cones};
-use super::run::RunError;
+use super::plan::memory_of;
+use super::run::{Records, RunError};
 use crate::model::clock::Clock;
 use crate::model::health::Counters;
 use crate::model::shafts::Shafts;
@@ -25,7 +27,7 @@ use std::collections::BTreeMap;
 /// The key that scales a scene.
 const KEY: &str = "/parameters/axons";
 /// Phases that are not the cones': what is solved before the run, and what moves tissue and fields.
-const SCENERY: [&str; 7] = ["mesh", "assembly", "matrix", "cues", "matrix motion", "cue fields", "record"];
+const SCENERY: [&str; 8] = ["mesh", "assembly", "plan", "matrix", "cues", "matrix motion", "cue fields", "record"];
 /// With more axons than this there is no plain loop beside: it would take long.
 const MOST_PLAIN: u64 = 200_000;
 /// With more axons than this each run is timed once.
@@ -127,7 +129,7 @@ impl Busy {
 /// Times a scene at several numbers of axons, ascending.
 ///
 /// # Errors
-/// A scene without the key, one that cannot be assembled, a fault while running.
+/// A scene without the key, one that cannot be assembled or does not fit into memory, a fault while running.
 pub fn bench(laboratory: &Laboratory, axons: &[u64], tick: &dyn Fn(f64)) -> Result<Bench, RunError> {
     let scene = laboratory.scene()?;
     if scene.merged.pointer(KEY).is_none() {
@@ -174,12 +176,14 @@ impl Timings {
 
 fn row(laboratory: &Laboratory, axons: u64, without_plain: &mut Option<String>) -> Result<Row, RunError> {
     let loaded = laboratory.load(&[], &[format!("{KEY}={axons}")])?;
+    let name = format!("{} with {KEY}={axons}", loaded.scene.name);
+    laboratory.room.admit(&name, &outlook(&loaded.scene), 1)?;
     let repetitions = if axons > MOST_REPEATED { 1 } else { laboratory.repetitions };
     let (mut own, mut plain, mut difference) = (Timings::default(), Timings::default(), None);
     let (mut last, mut bytes) = (None, None);
     for _ in 0..repetitions {
         drop(last.take());
-        let timed = run(laboratory, &loaded)?;
+        let timed = run(laboratory, (&name, &loaded))?;
         own.push(cone_seconds(&timed.phases), timed.busy);
         // What one run has given back, the next takes again: the first tells.
         bytes = bytes.or(timed.bytes);
@@ -235,10 +239,12 @@ fn cone_seconds(phases: &BTreeMap<&'static str, f64>) -> f64 {
 }
 
 /// Assembles a scene and runs it to its end.
-fn run(laboratory: &Laboratory, loaded: &Loaded) -> Result<Timed, RunError> {
+fn run(laboratory: &Laboratory, (name, loaded): (&str, &Loaded)) -> Result<Timed, RunError> {
     let before = memory_mib("VmRSS:");
     let busy = Busy::begin();
     let mut simulation = laboratory.assemble(loaded)?;
+    laboratory.room.admit(name, &memory_of(&simulation, loaded, Records::NOTHING)?, 1)?;
+    simulation.lap("plan");
     let end = simulation.world().resource::<Clock>().end;
     let mut marks = Vec::new();
     let mut next = 1;

@@ -279,7 +279,9 @@ impl<const D: usize, const WHOLE: bool, L: ContactPull<D>> WithSimd for Integrat
             }
         }
         for (sum, pull) in sums.iter_mut().zip(pull) {
-            pull.chunks_exact(LANES).for_each(|values| sum.add(values));
+            for values in pull.as_chunks().0 {
+                sum.add(values);
+            }
         }
     }
 }
@@ -294,11 +296,11 @@ struct Sum {
 
 impl Sum {
     #[inline(always)]
-    fn add(&mut self, values: &[f64]) {
+    fn add(&mut self, values: &[f64; LANES]) {
         // From here to a third more, numbers that can be told apart lie 2⁻³⁰ and 2⁻⁷⁰ apart.
         const COARSE: f64 = 1.5 * (1u64 << 22) as f64;
         const FINE: f64 = 1.5 / (1u64 << 18) as f64;
-        for ((coarse, fine), value) in self.coarse.iter_mut().zip(&mut self.fine).zip(values) {
+        for ((value, coarse), fine) in values.iter().zip(&mut self.coarse).zip(&mut self.fine) {
             let rounded = (value + COARSE) - COARSE;
             *coarse += rounded;
             *fine += ((value - rounded) + FINE) - FINE;
@@ -382,7 +384,7 @@ mod tests {
         let values: Vec<f64> = (0..8 * 500).map(|i| (1.0 + f64::from(i)).sin() * 10f64.powi(i % 40 - 38)).collect();
         let sum_of = |values: &[f64]| {
             let mut sum = Sum::default();
-            values.chunks_exact(LANES).for_each(|lanes| sum.add(lanes));
+            values.as_chunks().0.iter().for_each(|lanes| sum.add(lanes));
             sum.rounded()
         };
         let forward = sum_of(&values);

@@ -10,7 +10,7 @@ use std::collections::HashMap;
 use std::f64::consts::PI;
 
 use crate::numerics::polygon::{cross, dot, minus};
-use crate::numerics::simplex_mesh::BORDER;
+use crate::numerics::simplex_mesh::{BORDER, SimplexMesh};
 
 /// Sums of cotangents above this (negative) value count as Delaunay: four points on a circle, to round-off.
 const ROUND_OFF: f64 = -1e-10;
@@ -67,25 +67,14 @@ pub struct Triangles {
 }
 
 impl Triangles {
-    /// Triangles from flat cells (stride 3), each counter-clockwise; an entry left over is ignored.
-    pub fn new(flat: &[u32]) -> Self {
-        let cells: Vec<[u32; 3]> = flat.chunks_exact(3).map(|c| [c[0], c[1], c[2]]).collect();
-        let mut neighbours = vec![[BORDER; 3]; cells.len()];
-        let mut open: HashMap<[u32; 2], (usize, usize)> = HashMap::with_capacity(2 * cells.len());
-        for (cell, corners) in cells.iter().enumerate() {
-            for face in 0..3 {
-                let [a, b] = [corners[(face + 1) % 3], corners[(face + 2) % 3]];
-                match open.remove(&[b, a]) {
-                    Some((other, other_face)) => {
-                        neighbours[cell][face] = other as u32;
-                        neighbours[other][other_face] = cell as u32;
-                    }
-                    None => {
-                        open.insert([a, b], (cell, face));
-                    }
-                }
-            }
-        }
+    /// The triangles of a planar mesh.
+    pub fn of<const D: usize>(mesh: &SimplexMesh<D>) -> Self {
+        Self::new(mesh.cells(), mesh.neighbours())
+    }
+
+    /// Triangles from flat cells, each counter-clockwise, and the cells across their faces.
+    fn new(cells: &[u32], neighbours: &[u32]) -> Self {
+        let (cells, neighbours) = (cells.as_chunks().0.to_vec(), neighbours.as_chunks().0.to_vec());
         Self { cells, neighbours }
     }
 
@@ -229,6 +218,11 @@ mod tests {
     use crate::numerics::planar_domain::{Outline, PlanarDomain};
     use crate::numerics::triangulate::{FittedMesh, MeshOptions, triangulate};
 
+    fn triangles_of(cells: &[u32]) -> Triangles {
+        let vertices = cells.iter().max().map_or(0, |&last| last as usize + 1);
+        Triangles::new(cells, &SimplexMesh::<2>::match_faces(vertices, cells).unwrap())
+    }
+
     fn stretched() -> (FittedMesh, Vec<[f64; 2]>) {
         let domain = PlanarDomain::rectangle(800.0, 600.0);
         let outlines = [Outline::disc([400.0, 500.0], 50.0, 20.0), Outline::disc([430.0, 480.0], 40.0, 20.0)];
@@ -240,7 +234,7 @@ mod tests {
     #[test]
     fn a_fitted_mesh_is_delaunay_at_rest_and_not_after_the_papers_stretch() {
         let (fitted, now) = stretched();
-        let triangles = Triangles::new(fitted.mesh.cells());
+        let triangles = Triangles::of(&fitted.mesh);
         let rest = triangles.edge_report(fitted.mesh.vertices(), 1.0, 0.0);
         assert!(rest.monotone_lumped(), "{rest:?}");
         let bad = triangles.edge_report(&now, 1.0, 0.0);
@@ -251,7 +245,7 @@ mod tests {
     fn flips_restore_delaunay_and_keep_areas_of_regions_and_neighbours() {
         let (fitted, now) = stretched();
         let labels = region_labels(fitted.mesh.cell_count(), &fitted.regions);
-        let mut triangles = Triangles::new(fitted.mesh.cells());
+        let mut triangles = Triangles::of(&fitted.mesh);
         let before = triangles.edge_report(&now, 1.0, 0.0);
         let flips = triangles.flip_to_delaunay(&now, &labels);
         let after = triangles.edge_report(&now, 1.0, 0.0);
@@ -266,10 +260,10 @@ mod tests {
                 at(c, n) + at(n, c) < ROUND_OFF
             });
         assert_eq!(after.not_delaunay, between_labels.count(), "{before:?} {after:?}");
-        assert_eq!(triangles.neighbours, Triangles::new(&triangles.flat()).neighbours);
+        assert_eq!(triangles.neighbours, triangles_of(&triangles.flat()).neighbours);
         for region in &fitted.regions {
             let area = |t: &Triangles| region.iter().map(|&c| t.cotangent_and_area(&now, c as usize, 0).1).sum::<f64>();
-            assert!((area(&triangles) / area(&Triangles::new(fitted.mesh.cells())) - 1.0).abs() < 1e-13);
+            assert!((area(&triangles) / area(&Triangles::of(&fitted.mesh)) - 1.0).abs() < 1e-13);
         }
         assert!((0..triangles.cells.len()).all(|c| triangles.cotangent_and_area(&now, c, 0).1 > 0.0));
     }
@@ -278,7 +272,7 @@ mod tests {
     fn the_consistent_mass_needs_a_fine_mesh_and_an_equilateral_one_the_known_size() {
         let height = 0.75_f64.sqrt();
         let x = [[0.0, 0.0], [1.0, 0.0], [0.5, height], [1.5, height]];
-        let triangles = Triangles::new(&[0, 1, 2, 1, 3, 2]);
+        let triangles = triangles_of(&[0, 1, 2, 1, 3, 2]);
         let inner = |k: f64| triangles.edge_report(&x, 1.0, k).consistent_mass;
         assert_eq!((inner(7.999), inner(8.001)), (0, 5));
     }
@@ -286,7 +280,7 @@ mod tests {
     /// The monotonicity of two triangles over the edge from (−1, 0) to (1, 0), their tips at heights h above and below.
     fn pair(height: f64, diffusion: f64, degradation: f64) -> Monotonicity {
         let x = [[-1.0, 0.0], [1.0, 0.0], [0.0, height], [0.0, -height]];
-        Triangles::new(&[0, 1, 2, 1, 0, 3]).edge_report(&x, diffusion, degradation).monotonicity
+        triangles_of(&[0, 1, 2, 1, 0, 3]).edge_report(&x, diffusion, degradation).monotonicity
     }
 
     #[test]
@@ -300,7 +294,7 @@ mod tests {
         // One right triangle: its right angle faces the border and is all that is allowed; 120 degrees are a third too many.
         let lone = |height: f64| {
             let x = [[-1.0, 0.0], [1.0, 0.0], [0.0, height]];
-            Triangles::new(&[0, 1, 2]).edge_report(&x, 1.0, 0.0).monotonicity.angles
+            triangles_of(&[0, 1, 2]).edge_report(&x, 1.0, 0.0).monotonicity.angles
         };
         assert!((lone(1.0) - 1.0).abs() < 1e-14 && (lone(third) - 4.0 / 3.0).abs() < 1e-14);
     }
@@ -323,10 +317,10 @@ mod tests {
     fn a_thin_pair_is_flipped_unless_its_cells_differ() {
         let x = [[0.0, 0.0], [1.0, -0.1], [2.0, 0.0], [1.0, 0.1]];
         let flat = [0, 1, 2, 0, 2, 3];
-        let mut free = Triangles::new(&flat);
+        let mut free = triangles_of(&flat);
         assert_eq!(free.flip_to_delaunay(&x, &[]), 1);
         assert!(free.cells.iter().all(|c| c.contains(&1) && c.contains(&3)));
-        assert_eq!(Triangles::new(&flat).flip_to_delaunay(&x, &[0, 1]), 0);
+        assert_eq!(triangles_of(&flat).flip_to_delaunay(&x, &[0, 1]), 0);
     }
 
     #[test]

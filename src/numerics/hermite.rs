@@ -143,7 +143,7 @@ impl HermitePath {
         HermiteWeights {
             from,
             to,
-            value: [(1.0 + 2.0 * t) * r * r, h * t * r * r, t * t * (3.0 - 2.0 * t), -h * t * t * r],
+            value: cubic(t, h),
             derivative: [-6.0 * t * r / h, r * (1.0 - 3.0 * t), 6.0 * t * r / h, t * (3.0 * t - 2.0)],
         }
     }
@@ -175,6 +175,12 @@ impl HermitePath {
             *out = combine(weights, [*a, *b, *c, *d]);
         }
     }
+}
+
+/// Weights of the cubic at a share `t` of a part of length `h`.
+fn cubic(t: f64, h: f64) -> [f64; 4] {
+    let r = 1.0 - t;
+    [(1.0 + 2.0 * t) * r * r, h * t * r * r, t * t * (3.0 - 2.0 * t), -h * t * t * r]
 }
 
 fn combine(weights: &[f64; 4], data: [f64; 4]) -> f64 {
@@ -229,6 +235,14 @@ pub fn refine<E: From<HermiteError>>(
 pub fn tangent_guess(level: &Level, parameter: f64) -> Vec<f64> {
     let way = parameter - level.parameter;
     level.value.iter().zip(&level.slope).map(|(value, slope)| value + way * slope).collect()
+}
+
+/// The cubic through two levels, gone on with beyond the second: of order 4 in the way where the tangent is of order 2.
+pub fn cubic_guess([before, level]: [&Level; 2], parameter: f64) -> Vec<f64> {
+    let h = level.parameter - before.parameter;
+    let weights = cubic((parameter - before.parameter) / h, h);
+    let ends = before.value.iter().zip(&before.slope).zip(level.value.iter().zip(&level.slope));
+    ends.map(|((a, b), (c, d))| combine(&weights, [*a, *b, *c, *d])).collect()
 }
 
 /// Adds levels until the interpolant meets the tolerance at the middle of every interval.

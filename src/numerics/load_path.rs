@@ -5,16 +5,16 @@
 //! ([`crate::numerics::hermite`]). The velocity of the tissue is `ṡ` times the derivative *of that interpolant*, so that moving
 //! with it and evaluating the path agree to round-off.
 //!
-//! The march starts at rest, each level from the tangent predictor `U + Δs dU/ds`; where Newton's method fails the increment
-//! is halved, down to a smallest one, then the path ends in an error that says where. The middle of every interval is
+//! The march starts at rest, the next level from the tangent predictor `U + Δs dU/ds`, others from the cubic through the last
+//! two levels; where Newton's method fails the increment is halved, down to a smallest one, then the path ends in an error that says where. The middle of every interval is
 //! then solved too and compared with the interpolant, until the tolerance is met. `det F > 0` is checked of the interpolant as
 //! well, between the levels.
 //!
 //! The load is the path's parameter and nothing else is assumed of it; materials with history will march in time instead.
 
 use crate::numerics::hermite::{
-    HermiteError, HermitePath, Interpolation, Level, Refinement, RefinementReport, ValueAndSlope, refine_path,
-    tangent_guess,
+    HermiteError, HermitePath, Interpolation, Level, Refinement, RefinementReport, ValueAndSlope, cubic_guess,
+    refine_path, tangent_guess,
 };
 use crate::numerics::hyperelasticity::{Body, WorstCell};
 use crate::numerics::newton::{Equilibrium, EquilibriumError, NewtonOptions, equilibrium};
@@ -228,7 +228,7 @@ impl<const D: usize> PathSolver<'_, '_, D> {
             }
             // A last crumb of a step would only spoil the spacing.
             let target = if last.parameter + 1.01 * step >= 1.0 { 1.0 } else { last.parameter + step };
-            match self.equilibrium(target, &tangent_guess(&last, target)) {
+            match self.equilibrium(target, &self.guess(levels.last(), &last, target)) {
                 Ok((value, slope)) => {
                     levels.push(std::mem::replace(&mut last, Level { parameter: target, value, slope }));
                     step = (2.0 * step).min(widest);
@@ -244,6 +244,17 @@ impl<const D: usize> PathSolver<'_, '_, D> {
         }
         levels.push(last);
         Ok(levels)
+    }
+
+    /// The cubic through the last two levels where it can be used, else the tangent at the last.
+    fn guess(&self, before: Option<&Level>, last: &Level, target: f64) -> Vec<f64> {
+        let cubic = before.map(|before| {
+            let mut guess = cubic_guess([before, last], target);
+            self.body.impose(target, &mut guess);
+            guess
+        });
+        let usable = cubic.filter(|guess| self.body.admissible(target, guess));
+        usable.unwrap_or_else(|| tangent_guess(last, target))
     }
 
     fn refine(&mut self, marched: HermitePath) -> Result<(HermitePath, RefinementReport), LoadPathError> {

@@ -4,13 +4,13 @@
 //! K(U) δ = −f(U),     U ← U + α δ.
 //! ```
 //! The step is shortened (`α = 1, ½, ¼, …`) until `det F > 0` in every cell and, where the tangent is positive definite, the energy
-//! falls enough (Armijo); where it is indefinite, until the residual falls. A factor costs as much as ten solves, so a stable one
-//! serves for more steps, as long as each is a quarter of the one before; a last step comes from a factor of its own. The
-//! iteration stops at the energy norm `√|δ·f|` of that step, relative to `√(2W)`. The number of negative eigenvalues comes from the LDLT factor: an equilibrium
-//! with any is found all the same, but it is not stable.
+//! falls enough (Armijo); where it is indefinite, until the residual falls. A factor costs as much as five solves, so that of a
+//! stable state near the equilibrium serves for more steps, as long as each is a thousandth of the one before or less. The
+//! iteration stops where the energy norm `√|δ·f|` of the step still to come is below the tolerance, relative to `√(2W)`. The number of
+//! negative eigenvalues comes from the last LDLT factor: an equilibrium with any is found all the same, but it is not stable.
 //!
-//! The rate `dU/ds` follows from one more solve with the factor in hand, `K_ff dU_f/ds = −K_fp a − ∂f_f/∂s` (the last term where the
-//! body grows), since the last step was below the tolerance: nothing is factored for it.
+//! The rate `dU/ds` follows from the factor in hand, `K_ff dU_f/ds = −K_fp a − ∂f_f/∂s` (the last term where the body grows): by one solve
+//! if it is that of the equilibrium, else by as many as bring what is left below the tolerance.
 
 use crate::numerics::hyperelasticity::{Body, WorstCell};
 use crate::numerics::sparse::{Factor, SparseError, SymmetricMatrix};
@@ -18,7 +18,7 @@ use crate::numerics::sparse::{Factor, SparseError, SymmetricMatrix};
 /// When Newton's method stops.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct NewtonOptions {
-    /// Energy norm of the last step, relative to `√(2W)` (default 1e-12).
+    /// Energy norm of the step still to come, relative to `√(2W)` (default 1e-12).
     pub tolerance: f64,
     /// Factorisations at most (default 25).
     pub max_iterations: usize,
@@ -41,13 +41,15 @@ pub struct Equilibrium {
     pub energy: f64,
     /// Factorisations it took.
     pub iterations: usize,
-    /// Energy norm of the last step, relative to `√(2W)` (or to its value at a strain of 0.1 %, if that is larger).
+    /// Energy norm of the last step, or what it bounds that of the next by, relative to `√(2W)` (or to its value at a strain of 0.1 %,
+    /// if that is larger).
     pub residual: f64,
     /// The smallest `det F`.
     pub min_jacobian: f64,
     /// The cell of the smallest `det F`.
     pub min_jacobian_cell: usize,
-    /// Negative eigenvalues of the tangent: zero for a stable equilibrium.
+    /// Negative eigenvalues of the tangent: zero for a stable equilibrium. Of that of a state nearby, if one in which a thousandth of an
+    /// error was left by each step found the equilibrium.
     pub negative_eigenvalues: usize,
 }
 
@@ -123,6 +125,12 @@ pub fn equilibrium<const D: usize>(
     })
 }
 
+/// A step with an old factor may be this share of the one before; if it is more than `NEAR` a new factor is cheaper.
+const FAST: f64 = 0.25;
+const NEAR: f64 = 1e-3;
+/// By how much later steps may shrink less than the last did.
+const LATER: f64 = 10.0;
+
 struct Newton<'b, 'm, const D: usize> {
     body: &'b Body<'m, D>,
     load: f64,
@@ -165,30 +173,67 @@ impl<'b, 'm, const D: usize> Newton<'b, 'm, D> {
             self.residual = self.relative_norm(&step);
             let converged = self.residual <= options.tolerance && self.is_small(&step);
             self.displacement = self.advance(&step, converged).ok_or(Failure::NoDescent)?;
-            if converged {
-                return self.finish(&factor);
-            }
-            if step.stable {
-                self.use_up(&factor, options.tolerance)?;
+            let left = if converged {
+                Some(0.0)
+            } else if step.stable {
+                self.use_up(&factor, options.tolerance)?
+            } else {
+                None
+            };
+            if let Some(left) = left
+                && let Some(rate) = self.rate(&factor, (left, options.tolerance))?
+            {
+                return Ok(self.finished(rate, &factor));
             }
         }
         Err(Failure::NoConvergence)
     }
 
-    /// Takes more steps with a factor of a state nearby, while they shrink fast and lead to no cell turned inside out.
-    fn use_up(&mut self, factor: &Factor, tolerance: f64) -> Result<(), Failure> {
-        const FAST: f64 = 0.25;
-        while self.residual > tolerance {
+    /// Takes more steps with the factor of a state nearby, while they shrink very fast and lead to no cell turned inside out.
+    /// What a step leaves of an error, if the last is below the tolerance.
+    fn use_up(&mut self, factor: &Factor, tolerance: f64) -> Result<Option<f64>, Failure> {
+        loop {
             let step = self.step(factor)?;
             let norm = self.relative_norm(&step);
             let mut trial = self.displacement.clone();
             self.body.add_free(1.0, &step.direction, &mut trial);
             if norm > FAST * self.residual || !self.body.admissible(self.load, &trial) {
-                break;
+                return Ok(None);
             }
+            let left = LATER * norm / self.residual;
             (self.displacement, self.residual) = (trial, norm);
+            if left > LATER * NEAR {
+                return Ok(None);
+            }
+            if left * norm <= tolerance {
+                self.residual = left * norm;
+                return Ok(Some(left));
+            }
         }
-        Ok(())
+    }
+
+    /// `dU/ds` by a factor of which `left` is known (see [`Self::use_up`]); none where it takes too many solves.
+    fn rate(&self, factor: &Factor, (mut left, tolerance): (f64, f64)) -> Result<Option<Vec<f64>>, Failure> {
+        const SOLVES: usize = 5;
+        let body = self.body;
+        let mut rate = vec![0.0; body.unknowns()];
+        body.impose(1.0, &mut rate);
+        let mut norms: Vec<f64> = Vec::new();
+        while norms.len() < SOLVES {
+            let forces = body.restrict(&body.force_rate(self.load, &self.displacement, &rate));
+            let mut correction = forces.clone();
+            factor.solve(&mut correction)?;
+            body.add_free(-1.0, &correction, &mut rate);
+            let norm = dot(&forces, &correction).abs().sqrt();
+            if let Some(before) = norms.last() {
+                left = left.max(LATER * norm / before);
+            }
+            norms.push(norm);
+            if left * norm <= tolerance * norms[0] {
+                return Ok(Some(rate));
+            }
+        }
+        Ok(None)
     }
 
     fn factor(&mut self) -> Result<Factor, Failure> {
@@ -248,15 +293,10 @@ impl<'b, 'm, const D: usize> Newton<'b, 'm, D> {
         }
     }
 
-    fn finish(&self, factor: &Factor) -> Result<Equilibrium, Failure> {
+    fn finished(&self, rate: Vec<f64>, factor: &Factor) -> Equilibrium {
         let body = self.body;
-        let mut rate = vec![0.0; body.unknowns()];
-        body.impose(1.0, &mut rate);
-        let mut free = body.restrict(&body.force_rate(self.load, &self.displacement, &rate));
-        factor.solve(&mut free)?;
-        body.add_free(-1.0, &free, &mut rate);
         let (min_jacobian, min_jacobian_cell) = body.lowest_jacobian(&self.displacement);
-        Ok(Equilibrium {
+        Equilibrium {
             displacement: self.displacement.clone(),
             rate,
             energy: body.energy(self.load, &self.displacement),
@@ -265,7 +305,7 @@ impl<'b, 'm, const D: usize> Newton<'b, 'm, D> {
             min_jacobian,
             min_jacobian_cell,
             negative_eigenvalues: factor.negative_eigenvalues(),
-        })
+        }
     }
 }
 

@@ -9,6 +9,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use crate::numerics::cue_element::{Element, ReactionDiffusion, divergence};
+use crate::numerics::dissection::nested_dissection;
 use crate::numerics::quadratic_element::{Forms, QuadraticConstants, local_edges, node_count};
 use crate::numerics::reaction_diffusion::{
     Budget, ReactionDiffusionError, Source, WorkCount, check_law, check_length, check_volumes,
@@ -96,7 +97,9 @@ impl<'m, const D: usize> QuadraticSolver<'m, D> {
     /// The symbolic factorisation ran out of memory.
     pub fn new(mesh: &'m SimplexMesh<D>) -> Result<Self, ReactionDiffusionError> {
         let nodes = Arc::new(QuadraticNodes::new(mesh));
-        let pattern = SymmetricPattern::from_elements(nodes.count(), nodes.cells(), QuadraticNodes::<D>::STRIDE)?;
+        let (cells, stride) = (nodes.cells(), QuadraticNodes::<D>::STRIDE);
+        let order = nested_dissection(&nodes.positions(mesh.vertices()), cells, stride);
+        let pattern = SymmetricPattern::in_order(&order, cells, stride)?;
         let constants = Arc::new(QuadraticConstants::new::<D>());
         Ok(Self { mesh, nodes, constants, pattern, factorisations: 0, solves: Arc::default() })
     }

@@ -25,6 +25,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use crate::numerics::cue_element::{Connectivities, Element, assemble, divergence, subtract_matrix_rate};
 pub use crate::numerics::cue_element::{Mass, ReactionDiffusion};
 use crate::numerics::delaunay::{EdgeReport, Triangles, region_labels};
+use crate::numerics::dissection::nested_dissection;
 use crate::numerics::simplex_mesh::{MeshError, SimplexMesh};
 use crate::numerics::sparse::{Factor, SparseError, SymmetricPattern};
 
@@ -169,7 +170,7 @@ impl<'m, const D: usize> StationarySolver<'m, D> {
     /// # Errors
     /// The symbolic factorisation ran out of memory.
     pub fn new(mesh: &'m SimplexMesh<D>, regions: &[Vec<u32>]) -> Result<Self, ReactionDiffusionError> {
-        let pattern = SymmetricPattern::from_elements(mesh.vertex_count(), mesh.cells(), D + 1)?;
+        let pattern = pattern(mesh, mesh.cells())?;
         let labels = region_labels(mesh.cell_count(), regions);
         let solves = Arc::new(AtomicUsize::new(0));
         Ok(Self { mesh, labels, pattern, flipped: Vec::new(), symbolic: 1, factorisations: 0, solves })
@@ -241,7 +242,7 @@ impl<'m, const D: usize> StationarySolver<'m, D> {
     /// The connectivity for a configuration.
     fn topology(&mut self, coordinates: &[[f64; D]]) -> Result<Chosen<D>, ReactionDiffusionError> {
         let Some(plane) = in_plane(coordinates) else { return Ok((None, None)) };
-        let mut triangles = Triangles::new(self.mesh.cells());
+        let mut triangles = Triangles::of(self.mesh);
         if triangles.flip_to_delaunay(&plane, &self.labels) == 0 {
             return Ok((None, Some(triangles)));
         }
@@ -249,7 +250,7 @@ impl<'m, const D: usize> StationarySolver<'m, D> {
         if let Some(known) = self.flipped.iter().find(|(mesh, _)| mesh.cells() == cells) {
             return Ok((Some(known.clone()), Some(triangles)));
         }
-        let pattern = SymmetricPattern::from_elements(self.mesh.vertex_count(), &cells, D + 1)?;
+        let pattern = pattern(self.mesh, &cells)?;
         let mesh = Arc::new(SimplexMesh::new(coordinates.to_vec(), cells)?);
         self.symbolic += 1;
         if self.flipped.len() == KEPT_FLIPS {
@@ -258,6 +259,12 @@ impl<'m, const D: usize> StationarySolver<'m, D> {
         self.flipped.push((Arc::clone(&mesh), Arc::clone(&pattern)));
         Ok((Some((mesh, pattern)), Some(triangles)))
     }
+}
+
+/// The pattern of a connectivity. Its order is that of the reference configuration, so that it does not depend on which was the first.
+fn pattern<const D: usize>(mesh: &SimplexMesh<D>, cells: &[u32]) -> Result<Arc<SymmetricPattern>, SparseError> {
+    let order = nested_dissection(mesh.vertices(), cells, D + 1);
+    SymmetricPattern::in_order(&order, cells, D + 1)
 }
 
 /// A factored system in one configuration.

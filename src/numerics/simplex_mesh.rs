@@ -5,8 +5,6 @@
 //!
 //! Cells are stored flat with stride `D + 1`. Face `i` of a cell is the one opposite its local vertex `i`.
 
-use std::collections::HashMap;
-
 /// Marks "no neighbour" in [`SimplexMesh::neighbour`]: the face lies on the border of the domain.
 pub const BORDER: u32 = u32::MAX;
 
@@ -85,7 +83,7 @@ impl<const D: usize> SimplexMesh<D> {
                 return Err(MeshError::NoSuchVertex { cell, vertex, count: vertices.len() });
             }
         }
-        let neighbours = Self::match_faces(&cells)?;
+        let neighbours = Self::match_faces(vertices.len(), &cells)?;
         let mut mesh = Self { vertices, cells, neighbours, border: Vec::new() };
         for cell in 0..mesh.cell_count() {
             let volume = mesh.volume(&mesh.vertices, cell);
@@ -97,27 +95,47 @@ impl<const D: usize> SimplexMesh<D> {
         Ok(mesh)
     }
 
-    fn match_faces(cells: &[u32]) -> Result<Vec<u32>, MeshError> {
+    /// The cell across each face of `cells` (flat), or [`BORDER`]. Faces are sorted into those with the same lowest vertex, of
+    /// which there are few.
+    ///
+    /// # Errors
+    /// A face shared by more than two cells: the first cell that is one too many.
+    pub(crate) fn match_faces(vertices: usize, cells: &[u32]) -> Result<Vec<u32>, MeshError> {
+        let face = |slot: u32| {
+            let (cell, opposite) = (slot as usize / Self::STRIDE, slot as usize % Self::STRIDE);
+            let mut corners: [u32; D] =
+                std::array::from_fn(|k| cells[cell * Self::STRIDE + k + usize::from(k >= opposite)]);
+            corners.sort_unstable();
+            corners
+        };
+        let slots = 0..cells.len() as u32;
+        let mut ends = vec![0u32; vertices + 1];
+        slots.clone().for_each(|slot| ends[face(slot)[0] as usize + 1] += 1);
+        (0..vertices).for_each(|vertex| ends[vertex + 1] += ends[vertex]);
+        let starts = ends.clone();
+        let mut sorted = vec![0u32; cells.len()];
+        for slot in slots {
+            let end = &mut ends[face(slot)[0] as usize];
+            sorted[*end as usize] = slot;
+            *end += 1;
+        }
         let mut neighbours = vec![BORDER; cells.len()];
-        let mut open: HashMap<Vec<u32>, usize> = HashMap::with_capacity(cells.len());
-        for slot in 0..cells.len() {
-            let cell = slot / Self::STRIDE;
-            let corners = &cells[cell * Self::STRIDE..(cell + 1) * Self::STRIDE];
-            let mut face: Vec<u32> = corners.to_vec();
-            face.remove(slot % Self::STRIDE);
-            face.sort_unstable();
-            match open.get(&face) {
-                None => {
-                    open.insert(face, slot);
+        let mut surplus: Option<u32> = None;
+        for (&start, &end) in starts.iter().zip(&ends) {
+            let with_this = &mut sorted[start as usize..end as usize];
+            with_this.sort_unstable_by_key(|&slot| (face(slot), slot));
+            for same in with_this.chunk_by(|&one, &other| face(one) == face(other)) {
+                if let [one, other, rest @ ..] = same {
+                    neighbours[*one as usize] = other / Self::STRIDE as u32;
+                    neighbours[*other as usize] = one / Self::STRIDE as u32;
+                    surplus = rest.first().copied().into_iter().chain(surplus).min();
                 }
-                Some(&other) if neighbours[other] == BORDER => {
-                    neighbours[slot] = (other / Self::STRIDE) as u32;
-                    neighbours[other] = cell as u32;
-                }
-                Some(_) => return Err(MeshError::NotConforming { cell }),
             }
         }
-        Ok(neighbours)
+        match surplus {
+            Some(slot) => Err(MeshError::NotConforming { cell: slot as usize / Self::STRIDE }),
+            None => Ok(neighbours),
+        }
     }
 
     fn collect_border(&self) -> Vec<BorderFacet> {
@@ -181,6 +199,11 @@ impl<const D: usize> SimplexMesh<D> {
     /// The cell across face `face` of `cell`, or [`BORDER`].
     pub fn neighbour(&self, cell: usize, face: usize) -> u32 {
         self.neighbours[cell * Self::STRIDE + face]
+    }
+
+    /// The cell across each face, or [`BORDER`]: flat, stride `D + 1`.
+    pub fn neighbours(&self) -> &[u32] {
+        &self.neighbours
     }
 
     /// The facets on the border of the domain, in order of their cells.

@@ -505,7 +505,7 @@ mod tests {
             for (region, outline) in outlines.iter().enumerate() {
                 proptest::prop_assert!((region_area(&fitted, region) / outline.area() - 1.0).abs() < 1e-12);
             }
-            let report = Triangles::new(fitted.mesh.cells()).edge_report(fitted.mesh.vertices(), 1.0, 0.0);
+            let report = Triangles::of(&fitted.mesh).edge_report(fitted.mesh.vertices(), 1.0, 0.0);
             proptest::prop_assert!(report.monotone_lumped(), "{:?}", report);
         }
     }

@@ -120,9 +120,10 @@ impl Busy {
         Self(cpu_seconds(), Elapsed::default())
     }
 
-    /// How many threads have been at work, on average; none where the system does not tell.
+    /// How many threads have been at work, on average; none where the system does not tell, or forgot the time of threads that ended.
     fn threads(&self) -> Option<f64> {
-        Some((cpu_seconds()? - self.0?) / self.1.seconds().max(f64::MIN_POSITIVE))
+        let seconds = cpu_seconds()? - self.0?;
+        (seconds > 0.0).then(|| seconds / self.1.seconds().max(f64::MIN_POSITIVE))
     }
 }
 

@@ -68,7 +68,7 @@ pub fn compute(count: usize) -> Result<StretchMap, RunError> {
     let along = |axis: usize| -> Result<Vec<StretchPoint>, RunError> {
         (0..count.max(2)).into_par_iter().map(|i| point(&fitted, at(i), axis)).collect()
     };
-    let edges = Triangles::new(fitted.mesh.cells()).edge_report(fitted.mesh.vertices(), 1.0, 0.0).interior;
+    let edges = Triangles::of(&fitted.mesh).edge_report(fitted.mesh.vertices(), 1.0, 0.0).interior;
     Ok(StretchMap { vertices: fitted.mesh.vertex_count(), edges, upward: along(1)?, sideways: along(0)? })
 }
 
@@ -81,7 +81,7 @@ fn point(fitted: &FittedMesh, stretch: f64, axis: usize) -> Result<StretchPoint,
     let (mesh, across) = (&fitted.mesh, across(stretch));
     let factor = |k: usize| if k == axis { stretch } else { across };
     let now: Vec<[f64; 2]> = mesh.vertices().iter().map(|[x, y]| [factor(0) * x, factor(1) * y]).collect();
-    let mut triangles = Triangles::new(mesh.cells());
+    let mut triangles = Triangles::of(mesh);
     let share = |triangles: &Triangles| {
         let report = triangles.edge_report(&now, 1.0, 0.0);
         report.not_delaunay as f64 / report.interior as f64

@@ -282,10 +282,10 @@ fn report(world: &mut World, (name, cue): (&str, &Cue), field: &FieldPath) {
     note(&mut world.resource_mut::<Health>(), name, field);
     let (levels, unknowns) = (field.path.levels().len(), field.unknowns());
     let steps = field.report.solves;
-    let (times, solves) = match field.along {
-        Along::Time => (format!("in {steps} steps of time, {levels} levels kept"), steps),
-        Along::Load if levels == 1 => ("once".to_owned(), levels),
-        Along::Load => (format!("at {levels} load levels"), levels),
+    let (times, solves, work) = match field.along {
+        Along::Time => (format!("in {steps} steps of time, {levels} levels kept"), steps, Work::SteppedUnknown),
+        Along::Load if levels == 1 => ("once".to_owned(), levels, Work::FieldUnknown),
+        Along::Load => (format!("at {levels} load levels"), levels, Work::FieldUnknown),
     };
     let kind = if problem.order == Order::Quadratic { " of quadratic elements" } else { "" };
     let mut plan = world.resource_mut::<Plan>();
@@ -294,7 +294,7 @@ fn report(world: &mut World, (name, cue): (&str, &Cue), field: &FieldPath) {
     let part = format!("cue `{name}`");
     let current = size_of::<f64>() * field.path.components();
     plan.hold(&part, (field.path.bytes() + current) as f64, Each::Run);
-    plan.work(&part, Work::FieldUnknown, (solves * unknowns) as f64, Each::Run);
+    plan.work(&part, work, (solves * unknowns) as f64, Each::Run);
     if levels > 1 {
         plan.work(&part, Work::Interpolated, field.path.components() as f64, Each::Stage);
     }

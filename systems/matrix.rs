@@ -268,13 +268,13 @@ impl Mechanism for Matrix {
             "less motion, sliding edges or `neo_hookean`",
         );
         let held = path.path().bytes() as f64 + WORKSPACE * *unknowns as f64;
-        let (iterations, moved) = ((unknowns * report.newton_iterations) as f64, 2.0 * path.path().components() as f64);
+        let (iterations, moved) = ((unknowns * report.newton_iterations) as f64, path.path().components() as f64);
         let mut plan = model.plan();
         plan.hold("matrix", held, Each::Run);
         plan.work("matrix", Work::NewtonUnknown, iterations, Each::Run);
-        // Displacements and their rates, at each stage and at the step's end.
-        plan.work("matrix", Work::Interpolated, moved, Each::Stage);
-        plan.work("matrix", Work::Interpolated, moved, Each::Step);
+        // At each stage and at the step's end.
+        plan.work("matrix", Work::Moved, moved, Each::Stage);
+        plan.work("matrix", Work::Moved, moved, Each::Step);
         let curve = self.load.clone();
         model.insert(Loading { equilibria, inputs, curve, duration }).insert_law(self);
         model.motion(follow_load);

@@ -105,8 +105,12 @@ pub enum Work {
     NewtonUnknown,
     /// An unknown of a field at a load level: factor, field, gradient and their rates.
     FieldUnknown,
-    /// A number interpolated between load levels.
+    /// An unknown of a field at a step of time: solution, and gradient where it is kept.
+    SteppedUnknown,
+    /// A number of a field interpolated between levels.
     Interpolated,
+    /// A coordinate of a vertex moved along the load path, with its rate.
+    Moved,
     /// A cell whose deformation is looked at.
     DeformedCell,
     /// A gradient sampled and sensed.

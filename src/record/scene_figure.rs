@@ -223,16 +223,31 @@ pub fn draw(figure: &SceneFigure) -> Result<Svg, FigureError> {
     Ok(svg)
 }
 
-/// Bytes that drawing a figure of `panels` panels of one extent (µm) takes, and making a picture of it with `scale` pixels for a
-/// px: the field of one panel, as with one thread, and the page.
-///
-/// # Errors
-/// No panel, or no extent.
-pub fn bytes_to_draw(panels: usize, extent: [f64; 2], scale: f64) -> Result<f64, FigureError> {
-    let empty = Panel { vertices: vec![[0.0; 2], extent], ..Panel::default() };
-    let layout = Layout::of(&SceneFigure::new(" ", " ", vec![empty; panels]))?;
-    let page = layout.width * layout.height * scale.powi(2) * size_of::<u32>() as f64;
-    Ok(page + layout.drawing_area() * FIELD_DENSITY.powi(2) * raster::BYTES_A_PIXEL as f64)
+/// How large a figure is as a picture.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PictureSize {
+    /// Pixels of the page.
+    pub page: f64,
+    /// Pixels of the field of one panel.
+    pub field: f64,
+}
+
+impl PictureSize {
+    /// Of a figure of `panels` panels of one extent (µm), with `scale` pixels for a px.
+    ///
+    /// # Errors
+    /// No panel, or no extent.
+    pub fn of(panels: usize, extent: [f64; 2], scale: f64) -> Result<Self, FigureError> {
+        let empty = Panel { vertices: vec![[0.0; 2], extent], ..Panel::default() };
+        let layout = Layout::of(&SceneFigure::new(" ", " ", vec![empty; panels]))?;
+        let page = layout.width * layout.height * scale.powi(2);
+        Ok(Self { page, field: layout.drawing_area() * FIELD_DENSITY.powi(2) })
+    }
+
+    /// Bytes that drawing it takes: the field of one panel, as with one thread, and the page.
+    pub fn bytes_to_draw(&self) -> f64 {
+        self.page * size_of::<u32>() as f64 + self.field * raster::BYTES_A_PIXEL as f64
+    }
 }
 
 /// Refuses what cannot be drawn.

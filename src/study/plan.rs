@@ -11,6 +11,7 @@ use crate::model::tissue::Tissue;
 use crate::record::files;
 use crate::record::png::scale_for_dpi;
 use crate::record::recorder::Recorder;
+use crate::record::scene_figure::PictureSize;
 use crate::record::summary::{DerivedConstants, constants};
 use crate::scenario::load::Loaded;
 use crate::simulation::Simulation;
@@ -72,6 +73,7 @@ pub fn plan_of(simulation: &Simulation, loaded: &Loaded) -> Result<ScenePlan, Ru
     let lifetimes = lifetimes(world, &clock);
     let (expected, recorder) = expected_of(world, loaded, Records::ALL);
     let mesh = &world.resource::<Tissue>().mesh;
+    let figure = figure_of(world, &expected)?;
     let mut plan = world.resource::<Plan>().clone();
     tell_outputs(&mut plan, loaded, &recorder);
     Ok(ScenePlan {
@@ -84,8 +86,8 @@ pub fn plan_of(simulation: &Simulation, loaded: &Loaded) -> Result<ScenePlan, Ru
         cone_steps_at_most: lifetimes.iter().map(|ticks| ticks.div_ceil(clock.grid.step_ticks())).sum(),
         trajectory_points_at_most: expected.trajectory_points as u64,
         solved: simulation.counters(),
-        memory_mb: memory::estimate(world, &expected, scale_for_dpi(DPI).into())?,
-        cpu_seconds: seconds::estimate(world, &expected),
+        memory_mb: memory::estimate(world, &expected, figure.as_ref()),
+        cpu_seconds: seconds::estimate(world, &expected, figure.as_ref()),
         expected,
         notes: world.resource::<Health>().notes().to_vec(),
     })
@@ -96,8 +98,16 @@ pub fn plan_of(simulation: &Simulation, loaded: &Loaded) -> Result<ScenePlan, Ru
 /// # Errors
 /// A tissue without extent.
 pub fn memory_of(simulation: &Simulation, loaded: &Loaded, keep: Records) -> Result<Estimate, RunError> {
-    let (expected, _) = expected_of(simulation.world(), loaded, keep);
-    Ok(memory::estimate(simulation.world(), &expected, scale_for_dpi(DPI).into())?)
+    let world = simulation.world();
+    let (expected, _) = expected_of(world, loaded, keep);
+    Ok(memory::estimate(world, &expected, figure_of(world, &expected)?.as_ref()))
+}
+
+/// How large the figure will be; none if there will be none.
+fn figure_of(world: &World, expected: &Expectation) -> Result<Option<PictureSize>, RunError> {
+    let [low, high] = world.resource::<Tissue>().domain.bounding_box();
+    let size = || PictureSize::of(expected.pictures, [high[0] - low[0], high[1] - low[1]], scale_for_dpi(DPI).into());
+    Ok((expected.pictures > 0).then(size).transpose()?)
 }
 
 fn expected_of(world: &World, loaded: &Loaded, keep: Records) -> (Expectation, Recorder) {

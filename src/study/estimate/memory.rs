@@ -7,7 +7,7 @@
 use super::{Estimate, Expectation, held};
 use crate::model::plan::Plan;
 use crate::model::tissue::Tissue;
-use crate::record::scene_figure::{FigureError, bytes_to_draw};
+use crate::record::scene_figure::PictureSize;
 use bevy_ecs::prelude::World;
 
 /// Bytes in a megabyte.
@@ -21,28 +21,20 @@ const ROW: f64 = 80.0;
 /// A shaft vertex in a snapshot, its panel and the drawing (bytes).
 const DRAWN_VERTEX: f64 = 48.0;
 
-/// The peak of resident memory (MB) of a scene whose figure has `scale` pixels for a px.
-///
-/// # Errors
-/// A tissue without extent.
-pub fn estimate(world: &World, expected: &Expectation, scale: f64) -> Result<Estimate, FigureError> {
+/// The peak of resident memory (MB) of a scene, and of its figure, if it has one.
+pub fn estimate(world: &World, expected: &Expectation, figure: Option<&PictureSize>) -> Estimate {
     let mut estimate = held(world.resource::<Plan>(), expected);
     let tissue = world.resource::<Tissue>();
     estimate.add("program", PROGRAM);
     estimate.add("mesh", SETTING_UP * tissue.mesh.vertex_count() as f64);
     estimate.add("trajectories", ROW * expected.trajectory_points);
     estimate.add("recording", expected.recording_bytes);
-    let mut drawing = 0.0;
-    if expected.pictures > 0 {
-        let [low, high] = tissue.domain.bounding_box();
-        drawing = bytes_to_draw(expected.pictures, [high[0] - low[0], high[1] - low[1]], scale)?;
-        drawing += DRAWN_VERTEX * expected.drawn_vertices;
-    }
+    let drawing = figure.map_or(0.0, |figure| figure.bytes_to_draw() + DRAWN_VERTEX * expected.drawn_vertices);
     // The recording as it is written is a second copy, which has gone when the figure is drawn: the larger of both counts.
     match drawing >= expected.recording_bytes {
         true => estimate.add("figure", drawing),
         false => estimate.add("recording", expected.recording_bytes),
     }
     estimate.parts.iter_mut().for_each(|part| part.amount /= MEGABYTE);
-    Ok(estimate.summed())
+    estimate.summed()
 }

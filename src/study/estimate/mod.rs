@@ -12,7 +12,7 @@ use crate::model::clock::Clock;
 use crate::model::components::{GrowthCone, Site};
 use crate::model::growth::{Growth, Targets};
 use crate::model::observables::Observables;
-use crate::model::plan::{Each, Plan};
+use crate::model::plan::{Each, Plan, Task, Work};
 use crate::model::shafts::Shafts;
 use crate::model::tissue::Tissue;
 use crate::record::recorder::Recorder;
@@ -85,6 +85,8 @@ pub struct Expectation {
     pub drawn_vertices: f64,
     /// Bytes of the recording in memory, before it is deflated.
     pub recording_bytes: f64,
+    /// How much denser axons lie on their way than if they grew evenly spread: those that targets draw in.
+    pub crowding: f64,
 }
 
 /// One cone's life: ticks, and the length of its shaft over that of a segment.
@@ -129,6 +131,7 @@ impl Expectation {
             pictures: pictures.len(),
             drawn_vertices: pictures.iter().map(|&instant| vertices_at(instant)).sum(),
             recording_bytes: if film.frames > 0.0 { film.bytes(world) } else { 0.0 },
+            crowding: crowding(world, clock),
         }
     }
 
@@ -163,6 +166,31 @@ fn lives(world: &World, clock: &Clock) -> Vec<Life> {
     cones.iter(world).filter(|(cone, _)| cone.birth < clock.end).map(live).collect()
 }
 
+/// The mean over the way of births' extent over the extent that is left, which shrinks evenly to that of the targets; 1 where nothing
+/// leads to them. Of axons that do not come so far, the part of the way that they come.
+fn crowding(world: &World, clock: &Clock) -> f64 {
+    let Some(mut cones) = world.try_query::<(&GrowthCone, &Site)>() else { return 1.0 };
+    let tissue = world.resource::<Tissue>();
+    let births = cones.iter(world).map(|(_, site)| tissue.reference_position(*site)).map(|at| [at.x, at.y]);
+    let (Some((from, wide)), Some((to, narrow))) = (box_of(births), box_of(goals(world))) else { return 1.0 };
+    let fastest = cones.iter(world).map(|(cone, _)| cone.speed).fold(0.0, f64::max);
+    let (way, needed) = (fastest * clock.grid.hours(clock.end), DETOUR * (to[0] - from[0]).hypot(to[1] - from[1]));
+    let come = if way < needed { way / needed } else { 1.0 };
+    let left = 1.0 - come * (1.0 - (narrow / wide).min(1.0));
+    if left < 1.0 && wide > 0.0 { -left.ln() / (1.0 - left) } else { 1.0 }
+}
+
+/// Centre and longer side of the box about some points; none without points.
+fn box_of(points: impl IntoIterator<Item = [f64; 2]>) -> Option<([f64; 2], f64)> {
+    let boxes = points.into_iter().map(|point| (point, point));
+    let join = |(low, high): ([f64; 2], [f64; 2]), (a, b): ([f64; 2], [f64; 2])| {
+        ([low[0].min(a[0]), low[1].min(a[1])], [high[0].max(b[0]), high[1].max(b[1])])
+    };
+    let (low, high) = boxes.reduce(join)?;
+    let side = |k: usize| high[k] - low[k];
+    Some(([0, 1].map(|k| 0.5 * (low[k] + high[k])), side(0).max(side(1))))
+}
+
 /// Vertices of the targets (µm, at rest) if anything leads to them.
 fn goals(world: &World) -> Vec<[f64; 2]> {
     if world.resource::<Observables>().effects.is_empty() {
@@ -193,6 +221,8 @@ fn held(plan: &Plan, expected: &Expectation) -> Estimate {
 /// The plan's own parts of an estimate of time (ns).
 fn done(plan: &Plan, expected: &Expectation) -> Estimate {
     let mut estimate = Estimate::default();
-    told(&mut estimate, &plan.tasks, expected, |task| (&task.name, task.amount * seconds::unit(task.work), task.each));
+    let crowded = |work| if work == Work::EvenSegment { expected.crowding } else { 1.0 };
+    let time = |task: &Task| task.amount * crowded(task.work) * seconds::unit(task.work);
+    told(&mut estimate, &plan.tasks, expected, |task| (&task.name, time(task), task.each));
     estimate
 }

@@ -1,50 +1,58 @@
 //! The estimate of time: CPU seconds of one thread for a whole run, what is solved before the first step included.
 //!
-//! Counts times the nanoseconds below, which were measured on the reference machine (two shared x86-64 cores) on 2026-11-23 and
-//! are good for a third each way there; other machines are slower or faster as a whole.
+//! Counts times the nanoseconds below, which were measured on the reference machine (two shared x86-64 cores, nothing beside) on 2026-11-24 and
+//! are good for a quarter each way there; other machines are slower or faster as a whole.
 
 use super::{Estimate, Expectation, done};
+use crate::model::observables::{Effect, Observables};
 use crate::model::plan::{Each, Plan, Work};
 use crate::model::tissue::Tissue;
+use crate::record::scene_figure::PictureSize;
 use bevy_ecs::prelude::World;
 
 /// Nanoseconds in a second.
 const SECOND: f64 = 1e9;
 /// The start of the program (ns).
-const START: f64 = 5e6;
+const START: f64 = 6e6;
 /// A vertex of the mesh: meshing, edges, regions (ns).
-const MESH_VERTEX: f64 = 3000.0;
+const MESH_VERTEX: f64 = 1750.0;
 /// A step besides its stages and cones (ns).
-const STEP: f64 = 10_000.0;
+const STEP: f64 = 12_000.0;
 /// A growing cone at a stage: place, turn, walk, shaft (ns).
-const CONE_STAGE: f64 = 280.0;
+const CONE_STAGE: f64 = 430.0;
 /// A row of `trajectories.csv` (ns).
-const ROW: f64 = 700.0;
-/// A figure, whatever it shows: page, fonts, fields, compression (ns).
-const FIGURE: f64 = 9e7;
-/// A byte of the recording as it is filmed: looking, deflating, measures (ns).
-const RECORDED_BYTE: f64 = 8.0;
+const ROW: f64 = 370.0;
+/// A figure, whatever it shows: fonts, legend (ns).
+const FIGURE: f64 = 2e7;
+/// A pixel of the page: drawing, compression (ns).
+const PAGE_PIXEL: f64 = 14.5;
+/// A pixel of the tissue in a panel, and of an effect of cues laid over it (ns).
+const TISSUE_PIXEL: f64 = 80.0;
+const CUE_PIXEL: f64 = 67.0;
 /// A shaft vertex in a panel (ns).
-const DRAWN_VERTEX: f64 = 500.0;
+const DRAWN_VERTEX: f64 = 770.0;
+/// A byte of the recording: looking, deflating, measures (ns).
+const RECORDED_BYTE: f64 = 21.0;
 
 /// Nanoseconds of one unit of work that a part of a scene has told.
 pub(super) fn unit(work: Work) -> f64 {
     match work {
-        Work::NewtonUnknown => 2700.0,
-        Work::FieldUnknown => 720.0,
-        Work::Interpolated => 1.0,
-        Work::DeformedCell => 19.0,
-        Work::Sampled => 20.0,
-        Work::BorderFacet => 0.4,
-        Work::Neighbourhood => 950.0,
-        // Bundles put many more within reach than even spreading does; that is in it.
-        Work::EvenSegment => 170.0,
-        Work::Indexed => 1050.0,
+        Work::NewtonUnknown => 1130.0,
+        Work::FieldUnknown => 1700.0,
+        Work::SteppedUnknown => 410.0,
+        Work::Interpolated => 0.6,
+        Work::Moved => 16.0,
+        Work::DeformedCell => 24.5,
+        Work::Sampled => 17.5,
+        Work::BorderFacet => 0.09,
+        Work::Neighbourhood => 610.0,
+        Work::EvenSegment => 117.0,
+        Work::Indexed => 480.0,
     }
 }
 
-/// CPU seconds of a run on one thread.
-pub fn estimate(world: &World, expected: &Expectation) -> Estimate {
+/// CPU seconds of a run on one thread, its figure included, if it has one.
+pub fn estimate(world: &World, expected: &Expectation, figure: Option<&PictureSize>) -> Estimate {
     let mut estimate = done(world.resource::<Plan>(), expected);
     estimate.add("program", START);
     estimate.add("mesh", MESH_VERTEX * world.resource::<Tissue>().mesh.vertex_count() as f64);
@@ -52,8 +60,12 @@ pub fn estimate(world: &World, expected: &Expectation) -> Estimate {
     estimate.add("cones", CONE_STAGE * expected.cone_stages);
     estimate.add("trajectories", ROW * expected.trajectory_points);
     estimate.add("recording", RECORDED_BYTE * expected.recording_bytes);
-    if expected.pictures > 0 {
-        estimate.add("figure", FIGURE + DRAWN_VERTEX * expected.drawn_vertices);
+    if let Some(figure) = figure {
+        let effects = &world.resource::<Observables>().effects;
+        let shown = |effect| f64::from(u8::from(effects.values().any(|other| *other == effect)));
+        let field = TISSUE_PIXEL + CUE_PIXEL * (shown(Effect::Attract) + shown(Effect::Repel));
+        let pixels = PAGE_PIXEL * figure.page + field * figure.field * expected.pictures as f64;
+        estimate.add("figure", FIGURE + pixels + DRAWN_VERTEX * expected.drawn_vertices);
     }
     estimate.parts.iter_mut().for_each(|part| part.amount /= SECOND);
     estimate.summed()

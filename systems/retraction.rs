@@ -50,14 +50,17 @@ struct Retreat {
 
 kept! { struct Retreat { left } }
 
-/// When cones last drew back (h), and the number of the cue.
-#[derive(Debug, Clone, Copy, Resource)]
+/// When cones last drew back (h).
+#[derive(Debug, Clone, Copy, Default, Resource)]
 struct Retreats {
     last: f64,
-    cue: Option<usize>,
 }
 
-kept! { struct Retreats { last, cue } }
+kept! { struct Retreats { last } }
+
+/// The number of the cue at which cones collapse, if they do.
+#[derive(Debug, Clone, Copy, Resource)]
+struct CollapseCue(Option<usize>);
 
 impl Mechanism for Retraction {
     const NAME: &'static str = "retraction";
@@ -79,10 +82,14 @@ impl Mechanism for Retraction {
             CueFields::demand(model, cue);
         }
         model.attach(|_: &GrowthCone| Retreat::default());
-        model.keep_of_cones::<Retreat>().keep::<Retreats>();
+        model.insert(Retreats::default()).keep_of_cones::<Retreat>().keep::<Retreats>();
+        model.sound_if::<Retreats>(|world| {
+            let now = world.resource::<Clock>().hours();
+            world.get_resource::<Retreats>().is_some_and(|retreats| (0.0..=now).contains(&retreats.last))
+        });
         model.at_end(move |world| {
             let cue = cue.map(|cue| CueFields::number(world, &cue, "/collapse/cue")).transpose()?;
-            world.insert_resource(Retreats { last: 0.0, cue });
+            world.insert_resource(CollapseCue(cue));
             Ok(())
         });
         model.insert_law(self).phase(Phase::Remodel, retract);
@@ -121,7 +128,7 @@ fn course(law: &Retraction, status: Status, age: f64, concentration: f64) -> Cou
 fn retract(
     law: Res<Law<Retraction>>,
     mut retreats: ResMut<Retreats>,
-    fields: Option<Res<CueFields>>,
+    (fields, cue): (Option<Res<CueFields>>, Res<CollapseCue>),
     mut retreating: Query<&mut Retreat>,
     mut remodelling: Remodelling,
 ) {
@@ -130,7 +137,7 @@ fn retract(
     let Ok(mut tables) = retreating.contiguous_iter_mut() else { return };
     let Some(mut retreat) = tables.next() else { return };
     for (i, cone) in remodelling.standing().iter().enumerate() {
-        let concentration = match (&fields, retreats.cue) {
+        let concentration = match (&fields, cue.0) {
             (Some(fields), Some(cue)) if cone.status == Status::Growing => {
                 fields.sample(&remodelling.tissue.mesh, cue, cone.site).concentration
             }

@@ -134,7 +134,7 @@ impl Mechanism for Zippering {
         if self.adhesion.0 > 0.0 {
             model.phase(Phase::Remodel, zip);
         }
-        model.insert(Zippers::default()).keep::<Zippers>().insert_law(self);
+        model.insert(Zippers::default()).keep::<Zippers>().sound_if::<Zippers>(Zippers::are_sound).insert_law(self);
         Ok(())
     }
 }
@@ -149,6 +149,21 @@ fn zip(law: Res<Law<Zippering>>, mut zippers: ResMut<Zippers>, mut remodelling: 
 }
 
 impl Zippers {
+    /// Whether all that is named is there, and the last look was in the past.
+    fn are_sound(world: &World) -> bool {
+        let Some(zippers) = world.get_resource::<Self>() else { return true };
+        let (cells, shafts) = (world.resource::<Tissue>().mesh.cell_count(), world.resource::<Shafts>().count());
+        let is_there =
+            |site: Site| (site.cell as usize) < cells && site.weights.iter().all(|weight| weight.is_finite());
+        let sound = |(shaft, line): (&u32, &Vec<Node>)| {
+            (*shaft as usize) < shafts
+                && line.iter().all(|node| is_there(node.point.site) && node.point.time.is_finite())
+        };
+        let known = |shaft: &u32| zippers.lines.contains_key(shaft);
+        let now = world.resource::<Clock>().hours();
+        (0.0..=now).contains(&zippers.last) && zippers.lines.iter().all(sound) && zippers.resting.iter().all(known)
+    }
+
     /// Shafts that zip, in pairs, with the angle β (rad) at both ends now.
     pub fn angles(&self, place: impl Fn(Site) -> Vector3<f64>) -> Vec<[f64; 2]> {
         let angle = |bond: usize, forward: bool| self.arms((bond, forward), &place).map_or(0.0, |arms| arms.angle());

@@ -92,6 +92,18 @@ pub struct Counters {
     pub indexed_segments: u64,
 }
 
+impl Counters {
+    /// Whether no count is beyond what any run comes to, and a sum over runs holds.
+    pub(super) fn may_be(&self) -> bool {
+        const MOST: u64 = 1 << 53;
+        let Self { steps, rejected_steps, cone_steps, stages, cue_solves, cue_factorisations, .. } = *self;
+        let Self { matrix_solves, newton_iterations, neighbour_queries, indexed_segments, .. } = *self;
+        let first = [steps, rejected_steps, cone_steps, stages, cue_solves];
+        let second = [cue_factorisations, matrix_solves, newton_iterations, neighbour_queries, indexed_segments];
+        first.into_iter().chain(second).all(|count| count <= MOST)
+    }
+}
+
 kept! {
     struct Counters {
         steps, rejected_steps, cone_steps, stages, cue_solves, cue_factorisations, matrix_solves, newton_iterations,

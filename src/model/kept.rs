@@ -20,6 +20,7 @@ use bevy_ecs::prelude::{Component, Resource, With, World};
 type Writer = fn(&World, &mut Vec<u8>);
 type Reader = fn(&mut World, &mut KeptBytes) -> Result<(), Damage>;
 type Rebuilder = fn(&mut World);
+type Check = fn(&World) -> bool;
 
 /// One thing that is kept.
 #[derive(Debug, Clone)]
@@ -34,6 +35,7 @@ struct Entry {
 pub struct KeptState {
     entries: Vec<Entry>,
     rebuilders: Vec<Rebuilder>,
+    checks: Vec<(String, Check)>,
 }
 
 impl KeptState {
@@ -65,6 +67,12 @@ impl KeptState {
     /// Runs `rebuild` once all is read back: for what follows from it and is costly to make at every step.
     pub fn rebuilt_by(&mut self, rebuild: Rebuilder) -> &mut Self {
         self.rebuilders.push(rebuild);
+        self
+    }
+
+    /// Refuses what was read back unless `fits` says that a run of the scene may come to it; `name` says of what.
+    pub fn sound_if(&mut self, name: &str, fits: Check) -> &mut Self {
+        self.checks.push((name.to_owned(), fits));
         self
     }
 
@@ -110,6 +118,9 @@ impl KeptState {
             return Err(Damage(format!("it holds {} bytes more than this scene keeps", from.left())));
         }
         given.fits(world)?;
+        if let Some((name, _)) = self.checks.iter().find(|(_, fits)| !fits(world)) {
+            return Err(Damage(format!("`{name}`: no run of this scene comes to it")));
+        }
         self.rebuilders.iter().for_each(|rebuild| rebuild(world));
         Ok(())
     }
@@ -182,6 +193,20 @@ mod tests {
         assert_eq!(fresh.resource::<Memory>().number, 1.4);
         let mut journeys = fresh.query::<&Journey>();
         assert_eq!(journeys.iter(&fresh).map(|journey| journey.length).collect::<Vec<_>>(), [1.0, 2.0]);
+    }
+
+    #[test]
+    fn what_a_mechanism_says_cannot_be_is_refused_before_anything_is_rebuilt() {
+        let (before, kept) = world(&[1.0]);
+        let bytes = kept.write(&before);
+        let (mut fresh, mut kept) = world(&[0.0]);
+        kept.sound_if("memory", |world| world.resource::<Memory>().number > 0.5);
+        kept.rebuilt_by(|world| world.resource_mut::<Memory>().number = 9.0);
+        assert_eq!(
+            kept.read(&mut fresh, &bytes).unwrap_err().to_string(),
+            "`memory`: no run of this scene comes to it"
+        );
+        assert_eq!(fresh.resource::<Memory>().number, 0.1);
     }
 
     #[test]

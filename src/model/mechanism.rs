@@ -232,6 +232,14 @@ impl<'a> ModelBuilder<'a> {
         self
     }
 
+    /// Refuses a checkpoint unless `fits` says that a run of the scene may come to what was [kept](Self::keep) of `R`: for numbers of
+    /// cells, shafts and the like, which are used without a further look. The core's own state has been looked at by then.
+    pub fn sound_if<R>(&mut self, fits: fn(&World) -> bool) -> &mut Self {
+        let name = self.kept_name::<R>();
+        self.world.resource_mut::<KeptState>().sound_if(&name, fits);
+        self
+    }
+
     /// Runs `rebuild` when a run is resumed, once all that is kept has been read back: for what follows from it.
     pub fn rebuild(&mut self, rebuild: fn(&mut World)) -> &mut Self {
         self.world.resource_mut::<KeptState>().rebuilt_by(rebuild);

@@ -1,10 +1,11 @@
 //! Whether a state that was read back can be one of its scene. Its checksum tells damage; this tells what has the right checksum and was
 //! never written all the same: what the scene alone decides must be as the scene decides it, and what names a cell, a cone or a block must
-//! name one that is there. Looked at is the state of the core; what mechanisms keep is read by its kind alone.
+//! name one that is there. Looked at is the state of the core; mechanisms [look at their own](super::mechanism::ModelBuilder::sound_if).
 
 use super::births::BirthQueue;
 use super::clock::{Clock, StageTime};
 use super::components::{GrowthCone, Site, Status};
+use super::health::Counters;
 use super::keep::Damage;
 use super::remodel::SpareCones;
 use super::shafts::Shafts;
@@ -53,6 +54,7 @@ impl Given {
             ),
             ("births", both(&self.births, world.get_resource(), BirthQueue::may_become)),
             ("spare cones", both(&self.spares, world.get_resource(), SpareCones::may_become)),
+            ("counters", world.get_resource().is_none_or(Counters::may_be)),
             ("identities", identities(world) == self.cones),
             ("statuses", clock.is_none_or(|clock| nobody_grows_before_birth(clock.now, world))),
             ("sites", sites_are_in(cells, world)),
@@ -102,6 +104,18 @@ mod tests {
             world.spawn((GrowthCone { axon, population: 0, speed: 1.0, birth, birth_time: 0.0 }, status));
         }
         world
+    }
+
+    #[test]
+    fn counts_beyond_those_of_any_run_are_refused() {
+        let with = |indexed_segments: u64| {
+            let mut world = world(0, [(0, Status::Unborn); 2]);
+            world.insert_resource(Counters { indexed_segments, ..Counters::default() });
+            world
+        };
+        let fits = |count: u64| Given::of(&with(0)).fits(&with(count)).map_err(|damage| damage.to_string());
+        assert_eq!(fits(1 << 40), Ok(()));
+        assert!(fits(u64::MAX).unwrap_err().contains("`counters`"));
     }
 
     #[test]

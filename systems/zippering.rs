@@ -153,11 +153,9 @@ impl Zippers {
     fn are_sound(world: &World) -> bool {
         let Some(zippers) = world.get_resource::<Self>() else { return true };
         let (cells, shafts) = (world.resource::<Tissue>().mesh.cell_count(), world.resource::<Shafts>().count());
-        let is_there =
-            |site: Site| (site.cell as usize) < cells && site.weights.iter().all(|weight| weight.is_finite());
         let sound = |(shaft, line): (&u32, &Vec<Node>)| {
             (*shaft as usize) < shafts
-                && line.iter().all(|node| is_there(node.point.site) && node.point.time.is_finite())
+                && line.iter().all(|node| node.point.site.is_in(cells) && node.point.time.is_finite())
         };
         let known = |shaft: &u32| zippers.lines.contains_key(shaft);
         let now = world.resource::<Clock>().hours();

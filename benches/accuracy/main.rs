@@ -2,8 +2,8 @@
 //!
 //! Each scene is settled as a run would settle it. The error that is reached is measured over all axons of the scene
 //! without contact and noise, against a reference of a quarter of the mesh size (at most a 48th of the tissue's smaller
-//! side, no more than 100 000 vertices) and a sixteenth of the step (1024 steps or more). The price is the time of assembly and run at the choice over that of the cheapest of a grid
-//! of fixed settings that meets the same accuracy against the same reference: mesh sizes in ratios of √2, four of
+//! side, no more than 100 000 vertices) and a sixteenth of the step (1024 steps or more). The price is the time of
+//! assembly and run at the choice over that of the cheapest of a grid of fixed settings that meets the same accuracy against the same reference: mesh sizes in ratios of √2, four of
 //! them coarser than the choice and two finer, each with steps in ratios of 2 from 32 times the choice's down to a
 //! quarter of it. Seconds are CPU time of one thread, median of three; two scenes at a time, each on a thread of its
 //! own.

@@ -87,6 +87,11 @@ pub struct Site {
 kept! { struct Site { cell, weights } }
 
 impl Site {
+    /// Whether it names one of so many cells, at finite weights.
+    pub fn is_in(self, cells: usize) -> bool {
+        (self.cell as usize) < cells && self.weights.iter().all(|weight| weight.is_finite())
+    }
+
     /// The point of a planar mesh.
     pub fn planar(self) -> MaterialPoint<2> {
         MaterialPoint { cell: self.cell, weights: [self.weights[0], self.weights[1]] }

@@ -83,7 +83,7 @@ fn identities(world: &World) -> Vec<(u32, u16)> {
 
 fn sites_are_in(cells: usize, world: &World) -> bool {
     let Some(mut sites) = world.try_query_filtered::<&Site, With<GrowthCone>>() else { return true };
-    sites.iter(world).all(|site| (site.cell as usize) < cells && site.weights.iter().all(|weight| weight.is_finite()))
+    sites.iter(world).all(|site| site.is_in(cells))
 }
 
 /// Whether all cones that have begun were born by now (ticks).

@@ -6,8 +6,8 @@
 //! with it and evaluating the path agree to round-off.
 //!
 //! The march starts at rest, the next level from the tangent predictor `U + Δs dU/ds`, others from the cubic through the last
-//! two levels; where Newton's method fails the increment is halved, down to a smallest one, then the path ends in an error that says where. The middle of every interval is
-//! then solved too and compared with the interpolant, until the tolerance is met. `det F > 0` is checked of the interpolant as
+//! two levels; where Newton's method fails the increment is halved, down to a smallest one, then the path ends in an error
+//! that says where. The middle of every interval is then solved too and compared with the interpolant, until the tolerance is met. `det F > 0` is checked of the interpolant as
 //! well, between the levels.
 //!
 //! The load is the path's parameter and nothing else is assumed of it; materials with history will march in time instead.
@@ -248,11 +248,7 @@ impl<const D: usize> PathSolver<'_, '_, D> {
 
     /// The cubic through the last two levels where it can be used, else the tangent at the last.
     fn guess(&self, before: Option<&Level>, last: &Level, target: f64) -> Vec<f64> {
-        let cubic = before.map(|before| {
-            let mut guess = cubic_guess([before, last], target);
-            self.body.impose(target, &mut guess);
-            guess
-        });
+        let cubic = before.map(|before| cubic_guess([before, last], target));
         let usable = cubic.filter(|guess| self.body.admissible(target, guess));
         usable.unwrap_or_else(|| tangent_guess(last, target))
     }

@@ -7,7 +7,7 @@ use source::{Mention, Source, sources};
 /// What one room may name. The rule's text is what a broken rule is answered with.
 struct Room {
     folder: &'static str,
-    /// Rooms of the crate, `systems` for any of its files.
+    /// Rooms of the crate, or single files of theirs; `systems` for any of its files.
     rooms: &'static [&'static str],
     /// Packages, the standard library always.
     packages: &'static [&'static str],
@@ -27,9 +27,6 @@ const SEAM_FILES: &[&str] = &[
     "src/model/health.rs",
     "src/model/plan.rs",
 ];
-
-/// The one file of numerics that scenario may name: outlines are checked with the same plane geometry that meshes them.
-const PLANE_GEOMETRY: &str = "crate::numerics::polygon::";
 
 /// Files of `systems/` that other mechanisms may name.
 const PROVIDERS: &[&str] = &["cue_fields", "cue_keys", "matrix", "shaft_index"];
@@ -55,7 +52,8 @@ const ROOMS: &[Room] = &[
     },
     Room {
         folder: "src/scenario",
-        rooms: &["scenario", "model", "keys"],
+        // Outlines are checked with the same plane geometry that meshes them.
+        rooms: &["scenario", "model", "keys", "numerics::polygon"],
         packages: &["resvg", "serde", "serde_json", "serde_path_to_error", "schemars", "strsim", "thiserror"],
         rule: "scenario names serde, its file readers, the model's seam and numerics::polygon; never bevy_ecs or faer, no other numerics",
     },
@@ -112,8 +110,10 @@ fn packages() -> Vec<String> {
 fn is_allowed(room: &Room, source: &Source, mention: &Mention, packages: &[String]) -> bool {
     let first = mention.segments[0].as_str();
     if first == "crate" {
-        let shared = room.folder == "src/scenario" && mention.segments.join("::").starts_with(PLANE_GEOMETRY);
-        return shared || room.rooms.contains(&mention.segments[1].as_str());
+        let within = |allowed: &&str| {
+            mention.segments[1..].iter().map(String::as_str).take(allowed.split("::").count()).eq(allowed.split("::"))
+        };
+        return room.rooms.iter().any(within);
     }
     let seam = SEAM_FILES.contains(&source.path.as_str()) && SEAM.contains(&first);
     !packages.iter().any(|package| package == first) || room.packages.contains(&first) || seam

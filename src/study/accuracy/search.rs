@@ -4,6 +4,7 @@ use super::sequence::{Cost, Pilot, Sequence, errors, stagnates};
 use super::{Found, difference, given};
 use crate::model::plan::Plan;
 use crate::model::tissue::Configuration;
+use crate::numerics::polygon::bounding_box;
 use crate::scenario::load::Loaded;
 use crate::study::estimate::seconds::Rates;
 use crate::study::laboratory::{Laboratory, chaotic, cones, few_axons, run_until};
@@ -117,11 +118,8 @@ impl<'a> Search<'a> {
     }
 
     fn extent(&self) -> [f64; 2] {
-        let points = self.scene.scene.tissue.outline.outer().coordinates();
-        [0, 1].map(|k| {
-            let ends = points.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |e, p| [e[0].min(p[k]), e[1].max(p[k])]);
-            ends[1] - ends[0]
-        })
+        let [low, high] = bounding_box(&self.scene.scene.tissue.outline.outer().coordinates());
+        [0, 1].map(|k| high[k] - low[k])
     }
 
     /// Size of a place in the sequence of meshes (µm).

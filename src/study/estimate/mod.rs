@@ -15,6 +15,7 @@ use crate::model::observables::Observables;
 use crate::model::plan::{Each, Plan, Task, Work};
 use crate::model::shafts::Shafts;
 use crate::model::tissue::Tissue;
+use crate::numerics::polygon::bounding_box;
 use crate::record::recorder::Recorder;
 use crate::record::recording::film::FilmExtent;
 use bevy_ecs::prelude::World;
@@ -108,7 +109,8 @@ impl Expectation {
     /// Of an assembled scene and the recorder that would look at it.
     pub fn of(world: &World, recorder: &Recorder, trajectory_points: u64) -> Self {
         let clock = world.resource::<Clock>();
-        let lives = lives(world, clock);
+        let goals = goals(world);
+        let lives = lives(world, clock, &goals);
         let ticks = clock.grid.step_ticks();
         let first = lives.iter().map(|life| life.birth).min().unwrap_or_default();
         let last = lives.iter().map(|life| life.end).max().unwrap_or_default();
@@ -131,7 +133,7 @@ impl Expectation {
             pictures: pictures.len(),
             drawn_vertices: pictures.iter().map(|&instant| vertices_at(instant)).sum(),
             recording_bytes: if film.frames > 0.0 { film.bytes(world) } else { 0.0 },
-            crowding: crowding(world, clock),
+            crowding: crowding(world, clock, &goals),
         }
     }
 
@@ -149,10 +151,9 @@ impl Expectation {
 }
 
 /// The lives to be expected of the cones born before the end.
-fn lives(world: &World, clock: &Clock) -> Vec<Life> {
+fn lives(world: &World, clock: &Clock, goals: &[[f64; 2]]) -> Vec<Life> {
     let Some(mut cones) = world.try_query::<(&GrowthCone, &Site)>() else { return Vec::new() };
     let (tissue, segment) = (world.resource::<Tissue>(), world.resource::<Shafts>().mean_segment());
-    let goals = goals(world);
     let tick = clock.grid.tick();
     let live = |(cone, site): (&GrowthCone, &Site)| {
         let from = tissue.reference_position(*site);
@@ -168,11 +169,13 @@ fn lives(world: &World, clock: &Clock) -> Vec<Life> {
 
 /// The mean over the way of births' extent over the extent that is left, which shrinks evenly to that of the targets; 1 where nothing
 /// leads to them. Of axons that do not come so far, the part of the way that they come.
-fn crowding(world: &World, clock: &Clock) -> f64 {
+fn crowding(world: &World, clock: &Clock, goals: &[[f64; 2]]) -> f64 {
     let Some(mut cones) = world.try_query::<(&GrowthCone, &Site)>() else { return 1.0 };
     let tissue = world.resource::<Tissue>();
-    let births = cones.iter(world).map(|(_, site)| tissue.reference_position(*site)).map(|at| [at.x, at.y]);
-    let (Some((from, wide)), Some((to, narrow))) = (box_of(births), box_of(goals(world))) else { return 1.0 };
+    let births: Vec<_> =
+        cones.iter(world).map(|(_, site)| tissue.reference_position(*site)).map(|at| [at.x, at.y]).collect();
+    let ends = middle_and_side(&births).zip(middle_and_side(goals));
+    let Some(((from, wide), (to, narrow))) = ends else { return 1.0 };
     let fastest = cones.iter(world).map(|(cone, _)| cone.speed).fold(0.0, f64::max);
     let (way, needed) = (fastest * clock.grid.hours(clock.end), DETOUR * (to[0] - from[0]).hypot(to[1] - from[1]));
     let come = if way < needed { way / needed } else { 1.0 };
@@ -181,14 +184,10 @@ fn crowding(world: &World, clock: &Clock) -> f64 {
 }
 
 /// Centre and longer side of the box about some points; none without points.
-fn box_of(points: impl IntoIterator<Item = [f64; 2]>) -> Option<([f64; 2], f64)> {
-    let boxes = points.into_iter().map(|point| (point, point));
-    let join = |(low, high): ([f64; 2], [f64; 2]), (a, b): ([f64; 2], [f64; 2])| {
-        ([low[0].min(a[0]), low[1].min(a[1])], [high[0].max(b[0]), high[1].max(b[1])])
-    };
-    let (low, high) = boxes.reduce(join)?;
-    let side = |k: usize| high[k] - low[k];
-    Some(([0, 1].map(|k| 0.5 * (low[k] + high[k])), side(0).max(side(1))))
+fn middle_and_side(points: &[[f64; 2]]) -> Option<([f64; 2], f64)> {
+    let [low, high] = bounding_box(points);
+    let middle = [0, 1].map(|k| 0.5 * (low[k] + high[k]));
+    (!points.is_empty()).then_some((middle, (high[0] - low[0]).max(high[1] - low[1])))
 }
 
 /// Vertices of the targets (µm, at rest) if anything leads to them.

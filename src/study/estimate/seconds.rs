@@ -62,7 +62,7 @@ pub fn estimate(world: &World, expected: &Expectation, figure: Option<&PictureSi
     estimate.add("recording", RECORDED_BYTE * expected.recording_bytes);
     if let Some(figure) = figure {
         let effects = &world.resource::<Observables>().effects;
-        let shown = |effect| f64::from(u8::from(effects.values().any(|other| *other == effect)));
+        let shown = |effect| f64::from(effects.values().any(|other| *other == effect));
         let field = TISSUE_PIXEL + CUE_PIXEL * (shown(Effect::Attract) + shown(Effect::Repel));
         let pixels = PAGE_PIXEL * figure.page + field * figure.field * expected.pictures as f64;
         estimate.add("figure", FIGURE + pixels + DRAWN_VERTEX * expected.drawn_vertices);

@@ -189,27 +189,32 @@ fn checkpoints_at_every_step_change_nothing_and_each_of_them_would_do() {
     }
 }
 
-/// The state of a checkpoint with one part of it as it was in another.
-fn with_part_of(state: &[u8], other: &[u8], name: &str) -> Vec<u8> {
-    let parts = |bytes: &[u8]| {
-        let mut from = KeptBytes::new(bytes);
-        let mut parts = Vec::new();
-        while from.left() > 0 {
-            let name: String = from.read().unwrap();
-            let length: usize = from.read().unwrap();
-            parts.push((name, from.take(length).unwrap().to_vec()));
-        }
-        parts
-    };
-    let (mut mixed, mut found) = (Vec::new(), 0);
-    for ((own, part), (_, then)) in parts(state).into_iter().zip(parts(other)) {
-        found += usize::from(own == name);
-        let part = if own == name { then } else { part };
+/// The parts of a state by their names.
+fn parts(state: &[u8]) -> Vec<(String, Vec<u8>)> {
+    let mut from = KeptBytes::new(state);
+    let mut parts = Vec::new();
+    while from.left() > 0 {
+        let name: String = from.read().unwrap();
+        let length: usize = from.read().unwrap();
+        parts.push((name, from.take(length).unwrap().to_vec()));
+    }
+    parts
+}
+
+/// The part of a state that has a name.
+fn part_of(state: &[u8], name: &str) -> Vec<u8> {
+    parts(state).into_iter().find(|(own, _)| own == name).unwrap().1
+}
+
+/// A state with another part under one name.
+fn with_part(state: &[u8], name: &str, other: &[u8]) -> Vec<u8> {
+    let mut mixed = Vec::new();
+    for (own, part) in parts(state) {
+        let part = if own == name { other.to_vec() } else { part };
         own.keep(&mut mixed);
         part.len().keep(&mut mixed);
         mixed.extend(part);
     }
-    assert_eq!(found, 1, "{name}");
     mixed
 }
 
@@ -226,10 +231,43 @@ fn what_each_mechanism_remembers_matters() {
         let (first, later) = taken.split_first().unwrap();
         for part in parts {
             let forgotten = |checkpoint: &Checkpoint| {
-                let state = with_part_of(&checkpoint.state, &first.state, part);
+                let state = with_part(&checkpoint.state, part, &part_of(&first.state, part));
                 gone_on(&Checkpoint { state, ..checkpoint.clone() }, 1) != expected
             };
             assert!(later.iter().any(forgotten), "{part} could as well be forgotten");
+        }
+    }
+}
+
+/// What a mechanism kept names shafts, cells and times; none may be of another run.
+#[test]
+fn what_no_run_can_have_made_a_mechanism_remember_is_refused() {
+    let zippering = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios/zippering.json");
+    let refusal = |checkpoint: &Checkpoint, name: &str, part: &[u8]| {
+        let state = with_part(&checkpoint.state, name, part);
+        let forged = Checkpoint { state, ..checkpoint.clone() };
+        resumed(&forged, &systems::standard(), None).err().map(|error| error.to_string())
+    };
+    for (loaded, path, name) in [
+        (loaded(&scene(), &systems::standard()), Path::new("busy.json"), "retraction/Retreats"),
+        (shortened(&zippering), &zippering, "zippering/Zippers"),
+    ] {
+        let (_, taken) = whole(&loaded, path, &[0.5, 0.85]);
+        let own = part_of(&taken[0].state, name);
+        assert_eq!(refusal(&taken[0], name, &own), None);
+        let of_later = refusal(&taken[0], name, &part_of(&taken[1].state, name)).unwrap();
+        assert!(of_later.contains(name) && of_later.contains("no run of this scene"), "{of_later}");
+        if name == "zippering/Zippers" {
+            // The time of the last look; shafts at rest; lines by their shafts, each from its first point's cell on.
+            let late = part_of(&taken[1].state, name);
+            let resting = u64::from_le_bytes(late[8..16].try_into().unwrap()) as usize;
+            let first_shaft = 16 + 4 * resting + 8;
+            for place in [first_shaft, first_shaft + 4 + 8] {
+                let mut forged = late.clone();
+                forged[place..place + 4].fill(0xff);
+                let words = refusal(&taken[1], name, &forged).unwrap();
+                assert!(words.contains("no run of this scene"), "{words}");
+            }
         }
     }
 }

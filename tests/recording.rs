@@ -3,7 +3,6 @@
 mod common;
 
 use common::{loaded, recorded};
-use proptest::prelude::*;
 use serde_json::{Value, json};
 use std::sync::OnceLock;
 use tropism::record::recording::{Recording, RecordingError};
@@ -247,20 +246,31 @@ fn what_does_not_fit_is_refused_with_its_name() {
     assert_eq!(Recording::read(b"no recording at all"), Err(RecordingError::NotOne));
 }
 
-proptest! {
-    #![proptest_config(ProptestConfig::with_cases(400))]
+/// What a file with one bit changed reads as.
+fn with_bit(place: usize, bit: u32) -> Result<Recording, RecordingError> {
+    let mut file = bytes().to_vec();
+    file[place] ^= 1 << bit;
+    Recording::read(&file)
+}
 
-    /// A changed byte may go unnoticed in a word of the header, but it never ends in a panic; in the arrays it is always noticed.
-    #[test]
-    fn a_changed_byte_is_survived_and_noticed_in_the_arrays(place in 0.0..1.0f64, change in 1..=255u8) {
-        let mut file = bytes().to_vec();
-        let place = (place * file.len() as f64) as usize;
-        file[place] ^= change;
-        let length = u32::from_le_bytes(bytes()[8..12].try_into().unwrap()) as usize;
-        let read = Recording::read(&file);
-        prop_assert!(place < (12 + length).next_multiple_of(8) || read.is_err());
-        if let Ok(recording) = read {
-            recording.snapshot(4.0);
+/// A changed bit may go unnoticed in a word of the header, but it never ends in a panic; the arrays are those that were
+/// written, or it is noticed. (Deflate has more than one word for the same bytes, as where a pattern repeats.)
+#[test]
+fn a_changed_bit_is_survived_and_no_array_is_read_that_was_not_written() {
+    let whole = bytes();
+    let written = Recording::read(whole).unwrap();
+    let length = u32::from_le_bytes(whole[8..12].try_into().unwrap()) as usize;
+    let arrays = (12 + length).next_multiple_of(8);
+    let (mut noticed, mut same) = (0, 0);
+    for (place, bit) in (0..whole.len()).flat_map(|place| (0..8).map(move |bit| (place, bit))) {
+        match with_bit(place, bit) {
+            Ok(recording) if place < arrays => drop(recording.snapshot(4.0)),
+            Ok(recording) => {
+                assert_eq!(recording, written, "bit {bit} of byte {place}");
+                same += 1;
+            }
+            Err(_) => noticed += 1,
         }
     }
+    assert!(100 * same < noticed, "{same} changes read as if nothing had changed, {noticed} are noticed");
 }

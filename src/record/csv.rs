@@ -127,6 +127,13 @@ impl CsvTable {
         Ok(())
     }
 
+    /// Whether it may be another table with rows appended. (An entry may break a line: rows are at most as many as lines.)
+    pub fn continues(&self, other: &Self) -> bool {
+        let lines = self.text.strip_prefix(&other.text).map(|rows| rows.bytes().filter(|byte| *byte == b'\n').count());
+        let rows = self.rows.checked_sub(other.rows);
+        self.columns == other.columns && lines.zip(rows).is_some_and(|(lines, rows)| rows <= lines)
+    }
+
     /// The number of rows below the header.
     pub fn rows(&self) -> usize {
         self.rows

@@ -1,5 +1,9 @@
 //! The recorder: looks at a run after each step, when something is due, and changes nothing.
 
+mod sound;
+
+pub use sound::is_next;
+
 use super::csv::{Cell, CsvTable, RowError};
 use super::recording::film::{Film, MOST_BYTES};
 use super::snapshot::{Snapshot, TipView, tips};

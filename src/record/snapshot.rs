@@ -3,7 +3,7 @@
 use crate::kept;
 use crate::model::clock::Clock;
 use crate::model::components::{GrowthCone, Journey, Site, SpringState, Status};
-use crate::model::observables::{Effect, Observables};
+use crate::model::observables::{Effect, Observable, Observables};
 use crate::model::remodel::SpareCones;
 use crate::model::shafts::Shafts;
 use crate::model::tissue::{Configuration, Tissue};
@@ -83,6 +83,35 @@ impl Snapshot {
 }
 
 impl Snapshot {
+    /// Whether a run may have looked so on its way to `world`: as many vertices, cells, borders, fields, and targets as the scene has, a tip for
+    /// each shaft, and every position a number.
+    pub fn may_be_of(&self, world: &World) -> bool {
+        let (tissue, observables) = (world.resource::<Tissue>(), world.resource::<Observables>());
+        let vertices = tissue.mesh.vertex_count();
+        let same = |lines: &[(String, Vec<[f64; 2]>)], own: &[(String, Vec<u32>)]| {
+            let alike = |(line, own): (&(String, Vec<[f64; 2]>), &(String, Vec<u32>))| {
+                line.0 == own.0 && line.1.len() == own.1.len()
+            };
+            let finite = lines.iter().flat_map(|(_, line)| line).flatten().all(|x| x.is_finite());
+            finite && lines.len() == own.len() && lines.iter().zip(own).all(alike)
+        };
+        let is_field = |(view, field): (&FieldView, &Observable)| {
+            view.name == field.name && view.concentration.len() == (field.read)(world, field.index).len()
+        };
+        let axons = world.resource::<Shafts>().count();
+        self.time.is_finite()
+            && self.vertices.len() == vertices
+            && self.cells == tissue.mesh.cells()
+            && same(&self.borders, &border_vertices(tissue))
+            && same(&self.targets, &target_vertices(tissue))
+            && self.fields.len() == observables.fields.len()
+            && self.fields.iter().zip(&observables.fields).all(is_field)
+            && self.tips.len() == self.shafts.len()
+            && self.tips.iter().all(|tip| (tip.axon as usize) < axons)
+            && self.shafts.iter().all(|shaft| !shaft.is_empty())
+            && self.is_finite()
+    }
+
     /// Whether every position is a number: one that a fault has spoilt cannot be drawn.
     pub fn is_finite(&self) -> bool {
         let tips = self.tips.iter().flat_map(|tip| [&tip.position, &tip.heading]);
@@ -162,7 +191,7 @@ pub fn axon_records(world: &World) -> Vec<AxonRecord> {
 
 fn fields(world: &World) -> Vec<FieldView> {
     let observables = world.resource::<Observables>();
-    let view = |field: &crate::model::observables::Observable| FieldView {
+    let view = |field: &Observable| FieldView {
         name: field.name.clone(),
         effect: observables.effects.get(&field.name).copied(),
         concentration: (field.read)(world, field.index),

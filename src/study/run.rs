@@ -224,8 +224,16 @@ impl Run {
         let damaged = |damage: Damage| RunError::Resume(CheckpointError::from(damage).to_string());
         self.simulation.restore(state).map_err(damaged)?;
         let mut records = KeptBytes::new(records);
-        self.recorder = records.read().map_err(damaged)?;
-        Ok(self.outputs.restore(&mut records)?)
+        let recorder: Recorder = records.read().map_err(damaged)?;
+        if let Some(defect) = recorder.defect(&self.recorder, self.simulation.world()) {
+            return Err(damaged(Damage(format!("records: {defect}"))));
+        }
+        self.recorder = recorder;
+        self.outputs.restore(&mut records, self.simulation.world())?;
+        match records.left() {
+            0 => Ok(()),
+            more => Err(damaged(Damage(format!("records: {more} bytes are too many")))),
+        }
     }
 
     /// Steps to the end, or to the fault that ends the run. `between` is called after each step and may stop the run, with the reason.

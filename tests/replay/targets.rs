@@ -143,10 +143,13 @@ fn go_on(bytes: &[u8]) {
         return;
     }
     let Ok(Resumed { mut run, .. }) = resumed(&found, &roster, None) else { return };
-    for _ in 0..STEPS {
-        if run.simulation.is_over() || run.simulation.step().is_err() {
-            return;
-        }
+    let mut steps = 0;
+    let ended = run.to_end(|_| {
+        steps += 1;
+        (steps == STEPS).then(|| "far enough".to_owned())
+    });
+    if let Ok(ended) = ended {
+        let _ = run.finish(&loaded, &ended);
     }
 }
 

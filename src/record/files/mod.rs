@@ -15,6 +15,7 @@ mod vtu_series;
 
 use super::csv::RowError;
 use super::output::WriteError;
+use super::recorder::is_next;
 use crate::model::clock::{Clock, TimeGrid};
 use crate::model::keep::{Damage, Keep, KeptBytes};
 use crate::model::quantity::Time;
@@ -191,9 +192,14 @@ impl Outputs {
     ///
     /// # Errors
     /// Bytes that are of no such outputs; what could not be written.
-    pub fn restore(&mut self, from: &mut KeptBytes) -> Result<(), OutputError> {
+    pub fn restore(&mut self, from: &mut KeptBytes, world: &World) -> Result<(), OutputError> {
+        let now = world.resource::<Clock>().now;
         for timed in &mut self.0 {
             (timed.next, timed.seen) = from.read()?;
+            let waits = timed.interval.map_or(timed.next == u64::MAX, |every| is_next(timed.next, every, now));
+            if !waits || timed.seen.is_some_and(|seen| seen > now) {
+                return Err(Damage("files for other tools: they look at other instants".into()).into());
+            }
             timed.output.restore(from)?;
         }
         Ok(())

@@ -7,7 +7,7 @@
 use super::super::csv::{Cell, RowError};
 use super::super::output::{Partial, WriteError};
 use super::thrift::{Struct, varint};
-use crate::model::keep::{Keep, KeptBytes};
+use crate::model::keep::{Damage, Keep, KeptBytes};
 use flate2::{Compression, write::GzEncoder};
 use std::io::Write;
 use std::path::Path;
@@ -128,7 +128,12 @@ impl ParquetTable {
         for column in &mut self.columns {
             (column.present, column.values, column.flags) = (from.read()?, from.read()?, from.read()?);
         }
-        Ok(())
+        let whole = self.groups.len().checked_mul(GROUP).and_then(|rows| rows.checked_add(self.in_group));
+        let filled = self.columns.iter().all(|column| column.present.len() == self.in_group);
+        if self.in_group < GROUP && whole == Some(self.rows) && filled && contents.starts_with(MAGIC) {
+            return Ok(());
+        }
+        Err(Damage("a table for other tools has other rows".into()).into())
     }
 
     /// Ends the table and gives the file its name.

@@ -9,7 +9,7 @@ use super::super::output::{Partial, WriteError, clear_folder, write_unsynced};
 use super::swc_tree::{Tree, trees};
 use super::{Output, OutputError};
 use crate::model::clock::Clock;
-use crate::model::keep::{Keep, KeptBytes};
+use crate::model::keep::{Damage, Keep, KeptBytes};
 use crate::scenario::scene::Swc;
 use bevy_ecs::prelude::World;
 use std::collections::BTreeSet;
@@ -67,6 +67,9 @@ impl Output for SwcFiles {
 
     fn restore(&mut self, from: &mut KeptBytes) -> Result<(), OutputError> {
         self.looks = from.read()?;
+        if u32::try_from(self.looks).is_err() {
+            return Err(Damage(format!("{} looks at shafts are more than any run takes", self.looks)).into());
+        }
         Ok(())
     }
 

@@ -4,7 +4,7 @@ use super::super::csv::{Cell, CsvTable};
 use super::super::output::WriteError;
 use super::OutputError;
 use super::parquet::{Kind, ParquetTable};
-use crate::model::keep::{Keep, KeptBytes};
+use crate::model::keep::{Damage, Keep, KeptBytes};
 use crate::scenario::scene::Tables;
 use std::path::{Path, PathBuf};
 
@@ -63,7 +63,11 @@ impl Table {
     /// Bytes that are of no such table; what could not be written.
     pub fn restore(&mut self, from: &mut KeptBytes) -> Result<(), OutputError> {
         if let Some((_, csv)) = &mut self.csv {
-            *csv = from.read()?;
+            let read: CsvTable = from.read()?;
+            if !read.continues(csv) {
+                return Err(Damage("a table for other tools has other columns".into()).into());
+            }
+            *csv = read;
         }
         self.parquet.as_mut().map_or(Ok(()), |parquet| parquet.restore(from))
     }

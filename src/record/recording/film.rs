@@ -3,6 +3,8 @@
 //! Vertices and tips are kept in single precision until the end, when the box that they lie in is known. A tissue that rests is
 //! kept once, a field only where it differs from the one before.
 
+mod sound;
+
 use super::shaft_history::ShaftHistory;
 use super::{FULL, Header, NO_PARENT, RecordedBorder, RecordedCue, RecordedTarget, Recording, STAYS, VERSION};
 use crate::kept;

@@ -54,6 +54,18 @@ impl ShaftHistory {
         }
     }
 
+    /// Whether it is of so many shafts on a mesh of so many cells, each with vertices that are there in their order.
+    pub(super) fn is_of(&self, shafts: usize, cells: usize) -> bool {
+        let seen: usize = self.shafts.iter().map(|shaft| shaft.vertices.len()).sum();
+        let in_order = |shaft: &SeenShaft| {
+            let present = &shaft.present;
+            present.windows(2).all(|pair| pair[0] < pair[1])
+                && present.last().is_none_or(|&last| (last as usize) < shaft.vertices.len())
+                && shaft.vertices.iter().all(|vertex| (vertex.cell as usize) < cells)
+        };
+        self.shafts.len() == shafts && self.seen == seen && self.shafts.iter().all(in_order)
+    }
+
     /// Bytes that it takes.
     pub(super) fn bytes(&self) -> usize {
         self.seen * Self::bytes_a_vertex() + self.shafts.len() * size_of::<SeenShaft>()

@@ -19,6 +19,7 @@ use crate::numerics::hyperelasticity::{Body, Prescribed};
 use crate::numerics::load_path::{LoadPath, LoadPathOptions};
 use crate::numerics::material::MaterialError;
 use crate::prelude::*;
+use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use supports::{axis_of, hold_the_middle, outward_normal};
@@ -93,6 +94,8 @@ keys! {
 
 /// Bytes an unknown that solving takes: tangent, factor and what belongs to them. Ours, measured.
 const WORKSPACE: f64 = 2000.0;
+/// Vertices that are moved together.
+const AT_A_TIME: usize = 4096;
 
 impl EdgeMotion {
     /// Whether the edge leaves its place.
@@ -387,17 +390,34 @@ impl Loading {
     /// Coordinates (µm) and velocities (µm/h) at a time (h); at a corner of the load curve those of the piece before.
     pub fn motion(&self, rest: &[[f64; 2]], time: f64) -> (Vec<[f64; 2]>, Vec<[f64; 2]>) {
         let (load, rate) = self.at(time);
-        let (moved, slope) = self.configuration(rest, load);
-        (moved, slope.into_iter().map(|u| u.map(|du| du * rate)).collect())
+        let (mut moved, mut velocities) = (vec![[0.0; 2]; rest.len()], vec![[0.0; 2]; rest.len()]);
+        self.configure(rest, (load, rate), (&mut moved, &mut velocities));
+        (moved, velocities)
     }
 
     /// Coordinates (µm) and their derivative with respect to the load, at a load.
     pub fn configuration(&self, rest: &[[f64; 2]], load: f64) -> (Vec<[f64; 2]>, Vec<[f64; 2]>) {
-        let mut flat = vec![0.0; 2 * rest.len()];
-        self.path().displacement(load, &mut flat);
-        let moved = rest.iter().zip(flat.chunks_exact(2)).map(|(x, u)| [x[0] + u[0], x[1] + u[1]]).collect();
-        self.path().rate(load, &mut flat);
-        (moved, flat.chunks_exact(2).map(|u| [u[0], u[1]]).collect())
+        let (mut moved, mut slope) = (vec![[0.0; 2]; rest.len()], vec![[0.0; 2]; rest.len()]);
+        self.configure(rest, (load, 1.0), (&mut moved, &mut slope));
+        (moved, slope)
+    }
+
+    /// Writes coordinates (µm) at a load, and their velocities (µm/h) where it grows at a rate (1/h).
+    fn configure(
+        &self,
+        rest: &[[f64; 2]],
+        (load, rate): (f64, f64),
+        (moved, velocities): (&mut [[f64; 2]], &mut [[f64; 2]]),
+    ) {
+        let path = self.path().path();
+        let place = path.locate(load);
+        let vertices = (rest, moved, velocities).into_par_iter().with_min_len(AT_A_TIME).enumerate();
+        vertices.for_each(|(vertex, (rest, x, v))| {
+            for k in 0..2 {
+                let (u, slope) = path.component(&place, 2 * vertex + k);
+                (x[k], v[k]) = (rest[k] + u, slope * rate);
+            }
+        });
     }
 }
 
@@ -416,9 +436,8 @@ fn follow_load(
     if configuration.revision > 0 && configuration.load == load && configuration.load_rate == rate {
         return;
     }
-    let (moved, slope) = loading.configuration(tissue.mesh.vertices(), load);
-    configuration.velocities = slope.into_iter().map(|u| u.map(|du| du * rate)).collect();
-    configuration.coordinates = moved;
+    let Configuration { coordinates, velocities, .. } = &mut *configuration;
+    loading.configure(tissue.mesh.vertices(), (load, rate), (coordinates, velocities));
     (configuration.load, configuration.load_rate) = (load, rate);
     configuration.revision += 1;
 }

@@ -11,9 +11,11 @@ use crate::numerics::triangulate::{FittedMesh, MeshOptions, TriangulationError, 
 use bevy_ecs::prelude::Resource;
 use nalgebra::{Matrix2, Vector2, Vector3};
 use rayon::prelude::*;
-use std::cmp::Ordering;
 use std::collections::BTreeMap;
 use std::sync::Arc;
+
+/// Cells that are looked at together for one that is turned over.
+const AT_A_TIME: u32 = 4096;
 
 /// The tissue at rest: geometry, mesh, named edges and named regions. It never changes during a run.
 #[derive(Debug, Clone, Resource)]
@@ -112,8 +114,7 @@ impl Configuration {
     /// Spatial position of a site (µm).
     #[inline]
     pub fn position(&self, mesh: &SimplexMesh<2>, site: Site) -> Vector3<f64> {
-        let corners = mesh.cell(site.cell as usize);
-        let [a, b, c] = [0, 1, 2].map(|i| self.coordinates[corners[i] as usize]);
+        let [a, b, c] = at_corners(mesh, &self.coordinates, site.cell);
         let [second, third, _] = site.weights;
         let at = |k: usize| (1.0 - second - third) * a[k] + second * b[k] + third * c[k];
         Vector3::new(at(0), at(1), 0.0)
@@ -133,11 +134,16 @@ impl Configuration {
     /// What is wrong with the configuration, if anything: a vertex that is nowhere, or a cell that is flat or turned over.
     pub fn defect(&self, mesh: &SimplexMesh<2>) -> Option<String> {
         let area = |cell: u32| {
-            let [a, b, c] = [0, 1, 2].map(|i| self.coordinates[mesh.cell(cell as usize)[i] as usize]);
+            let [a, b, c] = at_corners(mesh, &self.coordinates, cell);
             (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
         };
-        let cells = (0..mesh.cell_count() as u32).into_par_iter().with_min_len(4096);
-        let cell = cells.find_first(|cell| area(*cell).partial_cmp(&0.0) != Some(Ordering::Greater))?;
+        let is_upright = |cell: u32| area(cell) > 0.0;
+        // Most often all are: so many at a time without asking between them.
+        let count = mesh.cell_count() as u32;
+        let cells = |first: u32| first..count.min(first + AT_A_TIME);
+        let pieces = (0..count.div_ceil(AT_A_TIME)).into_par_iter().map(|piece| piece * AT_A_TIME);
+        let piece = pieces.find_first(|first| !cells(*first).fold(true, |all, cell| all & is_upright(cell)))?;
+        let cell = cells(piece).find(|cell| !is_upright(*cell))?;
         let nowhere = |x: &[f64; 2]| !(x[0].is_finite() && x[1].is_finite());
         if let Some(vertex) = self.coordinates.iter().position(nowhere) {
             let [x, y] = self.coordinates[vertex];
@@ -213,10 +219,16 @@ impl Configuration {
     }
 }
 
-fn gradient_of(mesh: &SimplexMesh<2>, field: &[[f64; 2]], cell: u32) -> Matrix2<f64> {
+/// What the three vertices of a cell have.
+#[inline]
+fn at_corners(mesh: &SimplexMesh<2>, values: &[[f64; 2]], cell: u32) -> [[f64; 2]; 3] {
     let corners = mesh.cell(cell as usize);
+    [values[corners[0] as usize], values[corners[1] as usize], values[corners[2] as usize]]
+}
+
+fn gradient_of(mesh: &SimplexMesh<2>, field: &[[f64; 2]], cell: u32) -> Matrix2<f64> {
     let columns = |values: &[[f64; 2]]| {
-        let [a, b, c] = [0, 1, 2].map(|i| values[corners[i] as usize]);
+        let [a, b, c] = at_corners(mesh, values, cell);
         Matrix2::new(b[0] - a[0], c[0] - a[0], b[1] - a[1], c[1] - a[1])
     };
     let reference = columns(mesh.vertices());

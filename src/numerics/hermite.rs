@@ -149,6 +149,7 @@ impl HermitePath {
     }
 
     /// One component of the vector and its derivative with respect to the parameter, at weights from [`Self::locate`].
+    #[inline]
     pub fn component(&self, weights: &HermiteWeights, component: usize) -> (f64, f64) {
         let (from, to) = (&self.levels[weights.from], &self.levels[weights.to]);
         let data = [from.value[component], from.slope[component], to.value[component], to.slope[component]];
@@ -183,6 +184,7 @@ fn cubic(t: f64, h: f64) -> [f64; 4] {
     [(1.0 + 2.0 * t) * r * r, h * t * r * r, t * t * (3.0 - 2.0 * t), -h * t * t * r]
 }
 
+#[inline]
 fn combine(weights: &[f64; 4], data: [f64; 4]) -> f64 {
     weights[0] * data[0] + weights[1] * data[1] + weights[2] * data[2] + weights[3] * data[3]
 }

@@ -258,12 +258,11 @@ fn a_mesh_of_gmsh_gives_border_names_and_if_asked_for_its_vertices() {
     assert_eq!(again.status.code(), Some(0), "{}", errors(&again));
     let rows = |out: &str| std::fs::read(folder.0.join(out).join("trajectories.csv")).unwrap();
     assert!(rows("kept") == rows("again"));
-    let refined = tropism(&folder, &["again.json", "--set", "/tissue/refinement={}"]);
-    assert!(
-        refined.status.code() == Some(2) && errors(&refined).contains("gives the vertices inside"),
-        "{}",
-        errors(&refined)
-    );
+    for key in ["/tissue/refinement={}", "/tissue/corner_radius=50"] {
+        let refined = tropism(&folder, &["again.json", "--set", key]);
+        let told = errors(&refined);
+        assert!(refined.status.code() == Some(2) && told.contains("gives the vertices inside"), "{told}");
+    }
 }
 
 #[test]

@@ -11,15 +11,28 @@
 //! has its maximum the second keeps cells from being halved without end (ours). G c_h itself is of one order more: its error
 //! is about η².
 //!
+//! At a corner with an angle ω > π inside, fields go as r^λ with λ = π/ω < 1, and on an even mesh gradients converge no faster than h^λ
+//! there and h^2λ elsewhere. Edges of h = H (r/R)^(1−μ) give back the order of linear elements with μ < λ (Babuška, Kellogg and Pitkäranta, Numer.
+//! Math. 33, 1979, doi:10.1007/BF01399326), and that of the recovered gradient, two, with μ < λ/2: ∫ (h² r^(λ−3))² r dr is
+//! then finite. Here μ = 0.45 λ.
+//!
 //! A [`Grading`] keeps places by level: squares of twice the size / 2^level, with the squares around each, so that edges grow by a factor
 //! of two over two of them at the most.
 
+use crate::numerics::planar_domain::Corner;
 use crate::numerics::simplex_mesh::SimplexMesh;
 use crate::numerics::vector::{between, norm};
 use std::collections::BTreeSet;
+use std::f64::consts::PI;
 
 /// Levels there may be: edges of a thousandth of the size.
 pub const MOST_LEVELS: u8 = 10;
+
+/// By how much the angle inside a corner exceeds π (radians) where grading toward it is worth the while: 10°.
+pub const LEAST_CORNER: f64 = PI / 18.0;
+
+/// μ over π/ω.
+const CORNER: f64 = 0.45;
 
 /// Levels of refinement by place: edges of about size / 2^level.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -74,6 +87,25 @@ impl Grading {
             (1..=level).for_each(|level| corners(cell).for_each(|corner| self.ask(level, corner)));
         }
         self.count() > before
+    }
+
+    /// Asks for shorter edges around a corner with the angle ω > π inside: h = H (r/R)^(1−μ) at the distance r ≤ R, down to h = r,
+    /// [`MOST_LEVELS`] at most. R (µm) is `radius`, or the distance to the next corner: behind that lies another field, and places do not
+    /// overlap more than a few times however many corners there are.
+    pub fn toward_corner(&mut self, corner: &Corner, radius: f64) {
+        let (radius, power) = (radius.min(corner.room), 1.0 - CORNER * PI / corner.angle);
+        for level in 1..=MOST_LEVELS {
+            let (reach, length) = (radius * 0.5f64.powf(f64::from(level) / power), self.length(level));
+            if reach < length {
+                break;
+            }
+            let squares = (reach / (2.0 * length)).ceil() as i64;
+            let places = || (-squares..=squares).map(|i| 2.0 * length * i as f64);
+            let offsets = places().flat_map(|x| places().map(move |y| [x, y]));
+            offsets
+                .filter(|[x, y]| x.hypot(*y) <= reach)
+                .for_each(|[x, y]| self.ask(level, [corner.point[0] + x, corner.point[1] + y]));
+        }
     }
 
     fn count(&self) -> usize {
@@ -144,6 +176,31 @@ mod tests {
         assert!((mean / expected - 1.0).abs() < 0.15, "{mean} {expected}");
         let nothing = vec![0.0; values.len()];
         assert!(gradient_errors(&mesh, &nothing, &vec![[0.0; 2]; values.len()], length).iter().all(|e| *e == 0.0));
+    }
+
+    #[test]
+    fn edges_grow_from_a_corner_as_a_power_of_the_distance() {
+        let (size, angle) = (8.0, 1.5 * PI);
+        let mut grading = Grading::even(size);
+        grading.toward_corner(&Corner { point: [3.0, 5.0], angle, room: 90.0 }, 64.0);
+        let power = 1.0 - 0.45 / 1.5;
+        for step in 0..40 {
+            let away = 0.01 * 1.3f64.powi(step);
+            let wanted = size * (away / 64.0).min(1.0).powf(power);
+            for turn in (0..12).map(|i| 0.5 * f64::from(i)) {
+                let found = grading.size_at([3.0 + away * turn.cos(), 5.0 + away * turn.sin()]);
+                // Down to h = r; squares are as wide as two edges of their own, and ask for those around them.
+                if away > wanted {
+                    assert!(found <= wanted * 1.001, "{away}: {found} for {wanted}");
+                }
+                let farther = (away - 4.0 * wanted).max(0.0);
+                let least = 0.49 * size * (farther / 64.0).min(1.0).powf(power);
+                assert!(found >= least, "{away}: {found}, at least {least}");
+            }
+        }
+        let mut short = Grading::even(size);
+        short.toward_corner(&Corner { point: [3.0, 5.0], angle, room: 90.0 }, 4.0);
+        assert_eq!(short, Grading::even(size));
     }
 
     #[test]

@@ -5,9 +5,11 @@
 
 use std::f64::consts::PI;
 
+use rstar::RTree;
+
 use crate::numerics::polygon::{
-    MERGE_TOLERANCE, NearestOnEdge, bounding_box, distance, meeting_sides, nearest_on_side, ring_contains, sides,
-    signed_area, touches_ring,
+    MERGE_TOLERANCE, NearestOnEdge, bounding_box, cross, distance, dot, meeting_sides, minus, nearest_on_side,
+    ring_contains, sides, signed_area, touches_ring,
 };
 
 /// Why a polygon or a domain was refused.
@@ -166,6 +168,17 @@ impl Ring {
     }
 }
 
+/// A corner of a domain.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Corner {
+    /// Where (µm).
+    pub point: [f64; 2],
+    /// The angle inside (radians).
+    pub angle: f64,
+    /// Distance to the nearest other corner of the domain (µm).
+    pub room: f64,
+}
+
 /// A polygonal domain with holes and named edges.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PlanarDomain {
@@ -207,6 +220,25 @@ impl PlanarDomain {
     /// Smallest and largest coordinates (µm).
     pub fn bounding_box(&self) -> [[f64; 2]; 2] {
         bounding_box(&self.outer.points)
+    }
+
+    /// Corners at which the angle inside exceeds π by more than `least` (radians).
+    pub fn reentrant_corners(&self, least: f64) -> Vec<Corner> {
+        let corners = self.rings().flat_map(|ring| {
+            let (points, count) = (&ring.points, ring.points.len());
+            (0..count).map(move |i| {
+                let [before, point, after] = [i + count - 1, i, i + 1].map(|k| points[k % count]);
+                let (into, out) = (minus(point, before), minus(after, point));
+                (point, PI - cross(into, out).atan2(dot(into, out)))
+            })
+        });
+        let wide: Vec<_> = corners.filter(|(_, angle)| *angle > PI + least).collect();
+        if wide.is_empty() {
+            return Vec::new();
+        }
+        let tree = RTree::bulk_load(self.rings().flat_map(|ring| ring.points.iter().copied()).collect());
+        let room = |point| tree.nearest_neighbor_iter(point).nth(1).map_or(0.0, |other| distance(point, *other));
+        wide.into_iter().map(|(point, angle)| Corner { point, angle, room: room(point) }).collect()
     }
 
     /// Length of the bounding box's diagonal (µm): the scale of tolerances.
@@ -377,6 +409,30 @@ mod tests {
         assert_eq!(nested, Err(DomainError::HolesOverlap { first: 0, second: 1 }));
         let touching = domain(square(0.0, 10.0), vec![square(0.0, 3.0)]).check();
         assert!(matches!(touching, Err(DomainError::HoleOutside { .. })));
+    }
+
+    #[test]
+    fn re_entrant_corners_are_those_of_an_ell_and_of_holes_with_the_room_around_them() {
+        let ell = named(&[[0.0, 0.0], [4.0, 0.0], [4.0, 3.0], [1.0, 3.0], [1.0, 4.0], [0.0, 4.0]]);
+        let found = domain(ell, Vec::new()).reentrant_corners(0.1);
+        assert_eq!(found, vec![Corner { point: [1.0, 3.0], angle: 1.5 * PI, room: 1.0 }]);
+        let hexagon = |x: f64| -> Vec<[f64; 2]> {
+            (0..6).map(|i| PI / 3.0 * f64::from(i)).map(|turn| [x + turn.cos(), turn.sin()]).collect()
+        };
+        // A third hole comes nearer to one corner than its sides are long.
+        let dot = named(&[[2.2, -0.1], [2.4, -0.1], [2.4, 0.1], [2.2, 0.1]]);
+        let holes = vec![named(&hexagon(-0.4)), named(&hexagon(3.8)), dot];
+        let found = domain(square(-9.0, 9.0), holes).reentrant_corners(0.1);
+        assert_eq!(found.len(), 16);
+        for corner in &found[..12] {
+            let room = if distance(corner.point, [2.8, 0.0]) < 1e-9 { 0.4f64.hypot(0.1) } else { 1.0 };
+            assert!((corner.angle - 4.0 / 3.0 * PI).abs() < 1e-12 && (corner.room - room).abs() < 1e-12, "{corner:?}");
+        }
+        assert!(found[12..].iter().all(|corner| (corner.room - 0.2).abs() < 1e-12));
+        assert_eq!(domain(square(0.0, 1.0), Vec::new()).reentrant_corners(0.0), Vec::new());
+        // A circle of many sides has none.
+        let circle = Outline::disc([0.0, 0.0], 1.0, 0.05);
+        assert_eq!(domain(square(-9.0, 9.0), vec![named(&circle.points)]).reentrant_corners(0.1), Vec::new());
     }
 
     #[test]

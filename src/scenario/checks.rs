@@ -90,9 +90,13 @@ fn check_tissue(tissue: &Tissue, violations: &mut Violations) {
         if !found.is_empty() {
             return violations.extend_under("", found);
         }
-        violations.demand(vertices.is_empty() || tissue.refinement.is_none(), "/tissue/refinement", || {
-            "the outline gives the vertices inside; leave out one of both".to_owned()
-        });
+        for (key, given) in
+            [("refinement", tissue.refinement.is_some()), ("corner_radius", tissue.corner_radius.is_some())]
+        {
+            violations.demand(vertices.is_empty() || !given, &format!("/tissue/{key}"), || {
+                "the outline gives the vertices inside; leave out one of both".to_owned()
+            });
+        }
     }
     let vertices = tissue.expected_vertices();
     violations.demand(vertices <= tissue.max_vertices as f64, "/tissue/mesh_size", || {

@@ -20,6 +20,10 @@ keys! {
         pub mesh_size: Length = Length(15.0),
         /// Shorter edges where the cues' gradients ask for them. Absent: the same size everywhere.
         pub refinement: Option<Refinement> = None,
+        /// Shorter edges within this distance (at most that to the next corner) of corners inside which there are more than 190°, the
+        /// shorter the nearer, so that fields are as accurate as without the corner. Absent: none. Ours.
+        #[schemars(extend("exclusiveMinimum" = 0.0, "x-typical" = [10.0, 200.0]))]
+        pub corner_radius: Option<Length> = None,
         /// The smallest angle allowed in a triangle.
         #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 33.0, "x-typical" = [15.0, 30.0]))]
         pub min_angle: Angle = Angle(25.0),

@@ -20,7 +20,7 @@ use crate::model::shelf::Shelf;
 use crate::model::stopwatch::Stopwatch;
 use crate::model::tissue::{Configuration, Tissue};
 use crate::model::violation::Violation;
-use crate::numerics::mesh_grading::{Grading, MOST_LEVELS};
+use crate::numerics::mesh_grading::{Grading, LEAST_CORNER, MOST_LEVELS};
 use crate::numerics::planar_domain::{PlanarDomain, Ring};
 use crate::numerics::triangulate::{MeshOptions, TriangulationError};
 use crate::numerics::turning::derived;
@@ -190,6 +190,10 @@ impl Meshing<'_> {
     fn tissue(&self) -> Result<Tissue, AssemblyError> {
         let keys = &self.scene.tissue;
         let mut grading = Grading::even(keys.mesh_size.0);
+        if let Some(radius) = keys.corner_radius {
+            let corners = domain(&keys.outline).reentrant_corners(LEAST_CORNER);
+            corners.iter().for_each(|corner| grading.toward_corner(corner, radius.0));
+        }
         let mut tissue = self.fitted(&grading)?;
         let Some(refinement) = &keys.refinement else { return Ok(tissue) };
         let most = refinement.levels.min(u64::from(MOST_LEVELS)) as u8;

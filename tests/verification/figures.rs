@@ -37,7 +37,7 @@ pub fn orders(title: &str, axes: [&str; 2], curves: &[Curve]) -> Plot {
     let mut theory: Vec<f64> = curves.iter().map(|curve| curve.theory).collect();
     theory.sort_by(f64::total_cmp);
     theory.dedup();
-    let words: Vec<String> = theory.iter().map(f64::to_string).collect();
+    let words: Vec<String> = theory.iter().map(|order| ((order * 100.0).round() / 100.0).to_string()).collect();
     let expected = curves.iter().flat_map(Curve::expected);
     let expected = Series::new(format!("theory: {}", words.join(", ")), expected, Stroke::Underlay);
     plot(title, axes, measured.chain([expected]).collect())

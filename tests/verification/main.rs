@@ -1,6 +1,7 @@
 //! Does the code solve the equations? Closed forms, manufactured solutions and independent references.
 
 mod block;
+mod corners;
 mod elasticity;
 mod equilibria;
 mod figures;

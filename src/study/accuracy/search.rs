@@ -1,9 +1,10 @@
 //! The search for the cheapest step and mesh sizes.
 
-use super::sequence::{Cost, Pilot, Sequence, errors, stagnates};
+use super::sequence::{Cost, Pilot, Sequence, errors};
 use super::{Found, difference, given};
 use crate::model::plan::Plan;
-use crate::model::tissue::Configuration;
+use crate::model::tissue::{Configuration, Tissue};
+use crate::numerics::mesh_grading::LEAST_CORNER;
 use crate::numerics::polygon::bounding_box;
 use crate::scenario::load::Loaded;
 use crate::study::estimate::seconds::Rates;
@@ -19,8 +20,8 @@ const TAKEN: f64 = 1.0;
 const TAKEN_OF_SOME: f64 = 0.9;
 /// By how much a mesh of the matrix' own may move tips, over the accuracy asked for.
 const BY_MATRIX: f64 = 0.2;
-/// Pairs tried at most.
-const MOST_TRIALS: usize = 128;
+/// What the pairs tried may take together, over one run with the finest of both.
+const TRIALS: f64 = 16.0;
 /// Tolerance of the load path over the accuracy.
 const LEVELS: f64 = 1e-3;
 /// Axons of a population in a pilot.
@@ -31,13 +32,15 @@ const COARSEST_MESH: f64 = 1.0 / 6.0;
 const MESH_FOR_STEPS: i32 = 2;
 /// Steps of the clock with which refinement begins.
 const FEWEST_STEPS: f64 = 16.0;
+/// How far a mesh is graded toward re-entrant corners, as a share of the tissue's smaller extent.
+const CORNER_RADIUS: f64 = 0.25;
 /// Places before those, coarser ones, that may be chosen.
 const COARSER_MESHES: i32 = 3;
 const COARSER_STEPS: i32 = 2;
 /// Refinements of each kind at most.
 const MOST_REFINEMENTS: i32 = 14;
 /// A mesh of more vertices than this is not tried.
-const MOST_VERTICES: f64 = 1e5;
+const MOST_VERTICES: f64 = 4e5;
 
 pub struct Search<'a> {
     laboratory: &'a Laboratory<'a>,
@@ -46,6 +49,8 @@ pub struct Search<'a> {
     mesh: Option<f64>,
     /// Mesh size of the matrix (µm); none where it is that of the tissue, or the scene's own.
     matrix_mesh: Option<f64>,
+    /// Radius of grading toward re-entrant corners (µm), where there are such and the mesh is chosen.
+    corner_radius: Option<f64>,
     /// Step (h).
     step: f64,
     pilots: usize,
@@ -60,6 +65,8 @@ struct Whole {
     cone: f64,
     /// Share of its axons that pilots have.
     share: f64,
+    /// Whether the tissue has re-entrant corners.
+    has_corners: bool,
 }
 
 /// A run with the finest of both, and a bound of its own error, which is taken to be independent of that of others.
@@ -83,7 +90,8 @@ struct MatrixMesh {
 
 impl<'a> Search<'a> {
     pub fn new(laboratory: &'a Laboratory<'a>, scene: &'a Loaded, asked: f64) -> Self {
-        Self { laboratory, scene, mesh: None, matrix_mesh: None, step: scene.scene.time.step.0, pilots: 0, asked }
+        let step = scene.scene.time.step.0;
+        Self { laboratory, scene, mesh: None, matrix_mesh: None, corner_radius: None, step, pilots: 0, asked }
     }
 
     /// Searches for what is not given of step and mesh size.
@@ -96,6 +104,10 @@ impl<'a> Search<'a> {
             self.step = self.scene.scene.time.duration.0 / FEWEST_STEPS;
         }
         let whole = self.whole()?;
+        if whole.has_corners && !mesh_given && !given(self.scene, "/tissue/corner_radius") {
+            let [width, height] = self.extent();
+            self.corner_radius = Some(CORNER_RADIUS * width.min(height));
+        }
         let steps = if step_given { Sequence::fixed(self.step) } else { self.refined_steps(whole.longest_step)? };
         self.step = steps.values[steps.settled];
         let meshes = if mesh_given { Sequence::fixed(0.0) } else { self.refined_meshes()? };
@@ -110,6 +122,7 @@ impl<'a> Search<'a> {
     fn keys(&self) -> Vec<String> {
         let mut keys = vec![format!("/time/step={:e}", self.step)];
         keys.extend(self.mesh.map(|size| format!("/tissue/mesh_size={size:e}")));
+        keys.extend(self.corner_radius.map(|radius| format!("/tissue/corner_radius={radius:e}")));
         if self.scene.blocks.contains_key("matrix") && !given(self.scene, "/matrix/tolerance") {
             keys.push(format!("/matrix/tolerance={:e}", (LEVELS * self.asked).clamp(1e-9, 1e-3)));
         }
@@ -137,7 +150,8 @@ impl<'a> Search<'a> {
         let populations = self.scene.scene.populations.values().map(|population| population.count);
         let (all, few) = populations.fold((0, 0), |(all, few), count| (all + count, few + count.min(PILOT_AXONS)));
         let share = if all > 0 { few as f64 / all as f64 } else { 1.0 };
-        Ok(Whole { longest_step: self.step / worst, cone: Rates::of(world).cone_stage, share })
+        let has_corners = !world.resource::<Tissue>().domain.reentrant_corners(LEAST_CORNER).is_empty();
+        Ok(Whole { longest_step: self.step / worst, cone: Rates::of(world).cone_stage, share, has_corners })
     }
 
     fn refined_steps(&mut self, longest: f64) -> Result<Sequence, RunError> {
@@ -157,7 +171,7 @@ impl<'a> Search<'a> {
         })
     }
 
-    /// Refines until the errors at two places in a row are small, or no refinement helps or can be afforded; places
+    /// Refines until the errors at two places in a row are small, or no refinement can be afforded; places
     /// below nought are coarser ones, and left out where they cannot be run. `set` puts a place and returns its value,
     /// if it may be had.
     fn refined(
@@ -166,7 +180,7 @@ impl<'a> Search<'a> {
         mut set: impl FnMut(&mut Self, i32) -> Option<f64>,
     ) -> Result<Sequence, RunError> {
         let goal = SHARE * self.asked;
-        let (mut values, mut pilots, mut changes) = (Vec::new(), Vec::new(), Vec::new());
+        let (mut values, mut pilots) = (Vec::new(), Vec::new());
         for place in -coarser..0 {
             if let Some(value) = set(self, place)
                 && let Ok(pilot) = self.pilot()
@@ -179,15 +193,12 @@ impl<'a> Search<'a> {
         for place in 0..=MOST_REFINEMENTS {
             let Some(value) = set(self, place) else { break };
             let pilot = self.pilot()?;
-            if let Some(before) = pilots[first..].last() {
-                changes.push(difference(&before.tips, &pilot.tips));
-            }
             values.push(value);
             pilots.push(pilot);
             let refined = errors(&pilots[first..]);
             let settled =
                 refined.len() >= 3 && refined[refined.len() - 3..refined.len() - 1].iter().all(|error| *error <= goal);
-            if settled || stagnates(&changes) {
+            if settled {
                 break;
             }
         }
@@ -223,7 +234,12 @@ impl<'a> Search<'a> {
                 steps.costs[i].on(&Rates { newton, ..mesh }, whole.cone / whole.share)
             };
             pairs.sort_by(|a, b| time(a).total_cmp(&time(b)));
-            for (step, mesh) in pairs.into_iter().take(MOST_TRIALS) {
+            let mut left = TRIALS * time(&(steps.finest(), meshes.finest()));
+            for (step, mesh) in pairs {
+                left -= time(&(step, mesh));
+                if left < 0.0 {
+                    break;
+                }
                 self.put(steps, step, meshes, mesh);
                 self.matrix_mesh =
                     matrix.map(|matrix| matrix.size).filter(|size| self.mesh.is_some_and(|mesh| *size > mesh));

@@ -83,9 +83,3 @@ pub fn errors(pilots: &[Pilot]) -> Vec<f64> {
     let tail = coarser.last().map_or(0.0, |last| difference(&last.tips, &finest.tips));
     coarser.iter().map(|pilot| difference(&pilot.tips, &finest.tips) + tail).chain([tail]).collect()
 }
-
-/// Whether the last three refinements changed tips as much as all before.
-pub fn stagnates(changes: &[f64]) -> bool {
-    let least = |changes: &[f64]| changes.iter().copied().fold(f64::INFINITY, f64::min);
-    changes.len() >= 8 && least(&changes[changes.len() - 3..]) > 0.8 * least(&changes[..changes.len() - 3])
-}

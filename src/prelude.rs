@@ -18,6 +18,7 @@ pub use crate::model::components::{
     Axon, GrowthCone, Journey, Position, ReceptorWeights, Site, SpringState, Status, Velocity,
 };
 pub use crate::model::cones::{Cone, Cones, ConesWith};
+pub use crate::model::configuration::Configuration;
 pub use crate::model::growth::{Growth, Population, Populations, ShaftPopulations, Targets};
 pub use crate::model::health::{Counters, Health};
 pub use crate::model::keep::{Damage, Keep, KeptBytes};
@@ -38,7 +39,7 @@ pub use crate::model::schedule::{Phase, Term};
 pub use crate::model::shafts::{ShaftPoint, Shafts, Successor, VertexId};
 pub use crate::model::shape::{Point, Shape};
 pub use crate::model::shelf::Shelf;
-pub use crate::model::tissue::{Configuration, Tissue};
+pub use crate::model::tissue::Tissue;
 pub use crate::model::violation::{Violation, Violations};
 pub use crate::numerics::law_check::{LawDefects, law_defects};
 pub use crate::numerics::material::{Lame, Material, Tensor};

@@ -84,7 +84,7 @@ fn bound_edges(tissue: Res<Tissue>, configuration: Res<Configuration>, mut boxes
 fn bounding_box(tissue: &Tissue, configuration: &Configuration, facets: &[BorderFacet]) -> Bounds {
     let mut bounds = [[f64::INFINITY; 2], [f64::NEG_INFINITY; 2]];
     for vertex in facets.iter().flat_map(|facet| tissue.mesh.facet_vertices(*facet)) {
-        let x = configuration.coordinates[vertex as usize];
+        let x = configuration.vertex(vertex as usize);
         for k in 0..2 {
             bounds[0][k] = bounds[0][k].min(x[k]);
             bounds[1][k] = bounds[1][k].max(x[k]);
@@ -162,7 +162,7 @@ fn edge_pull(
 fn facet_ends(tissue: &Tissue, configuration: &Configuration, facet: BorderFacet) -> [Vector3<f64>; 2] {
     let corners = tissue.mesh.cell(facet.cell as usize);
     let end = |k: usize| {
-        let x = configuration.coordinates[corners[(facet.face as usize + k) % 3] as usize];
+        let x = configuration.vertex(corners[(facet.face as usize + k) % 3] as usize);
         Vector3::new(x[0], x[1], 0.0)
     };
     [end(1), end(2)]

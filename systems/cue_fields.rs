@@ -12,7 +12,7 @@ pub use super::cue_keys::{Cue, Element, Gradient, Mass, Release, Start, Transpor
 use super::matrix::Loading;
 use crate::model::observables::{Observable, Observables};
 use crate::numerics::field_path::{Along, FieldPath, FieldProblem, FieldSolvers, Order};
-use crate::numerics::hermite::Refinement;
+use crate::numerics::hermite::{HermiteWeights, Refinement};
 use crate::numerics::reaction_diffusion::Mass as MassMatrix;
 use crate::numerics::simplex_mesh::SimplexMesh;
 use crate::numerics::transient_field::solve_in_time;
@@ -114,11 +114,12 @@ pub struct CueFields {
     current: Vec<Current>,
 }
 
-/// The values of a field at a parameter of its path.
+/// A field at a parameter of its path: all its values at hand, or only where they are on the path.
 #[derive(Debug)]
 struct Current {
     parameter: Option<f64>,
     values: Vec<f64>,
+    on_path: Option<HermiteWeights>,
 }
 
 /// Load of the tissue and time (h) at which fields are wanted.
@@ -165,22 +166,32 @@ impl CueFields {
     /// Concentration and gradient of cue `index` at a site.
     #[inline]
     pub fn sample(&self, mesh: &SimplexMesh<2>, index: usize, site: Site) -> CueSample {
-        self.sample_from(mesh, index, &self.current[index].values, site)
+        let (Current { values, on_path, .. }, path) = (&self.current[index], &self.solved.fields[index].path);
+        match on_path {
+            None => self.sample_from(mesh, index, |i| values[i], site),
+            Some(place) => self.sample_from(mesh, index, |i| path.value(place, i), site),
+        }
     }
 
     #[inline]
-    fn sample_from(&self, mesh: &SimplexMesh<2>, index: usize, values: &[f64], site: Site) -> CueSample {
+    fn sample_from(&self, mesh: &SimplexMesh<2>, index: usize, value: impl Fn(usize) -> f64, site: Site) -> CueSample {
         let [second, third, _] = site.weights;
         let place = (site.cell as usize, [1.0 - second - third, second, third]);
-        let (c, gradient) = self.solved.fields[index].layout.sample(mesh, values, place);
+        let (c, gradient) = self.solved.fields[index].layout.sample(mesh, value, place);
         CueSample { concentration: c.max(0.0), gradient: Vector3::new(gradient[0], gradient[1], 0.0) }
     }
 
-    fn bring_to(&mut self, moment: Moment) {
+    /// Brings the fields to a moment: all their values, or, where few are asked for, none.
+    fn bring_to(&mut self, moment: Moment, few: bool) {
         for (field, current) in self.solved.fields.iter().zip(&mut self.current) {
             let parameter = moment.along(field);
             if current.parameter != Some(parameter) {
-                field.path.evaluate(parameter, &mut current.values);
+                let here_and_there = few && field.path.levels().len() > 1;
+                current.on_path = here_and_there.then(|| field.path.locate(parameter));
+                if !here_and_there {
+                    current.values.resize(field.path.components(), 0.0);
+                    field.path.evaluate(parameter, &mut current.values);
+                }
                 current.parameter = Some(parameter);
             }
         }
@@ -190,7 +201,8 @@ impl CueFields {
     fn at(&self, index: usize, moment: Moment) -> Cow<'_, [f64]> {
         let field = &self.solved.fields[index];
         let parameter = moment.along(field);
-        if self.current[index].parameter == Some(parameter) {
+        let Current { parameter: here, on_path, .. } = &self.current[index];
+        if *here == Some(parameter) && on_path.is_none() {
             return Cow::Borrowed(&self.current[index].values);
         }
         let mut values = vec![0.0; field.path.components()];
@@ -200,7 +212,8 @@ impl CueFields {
 }
 
 fn bring_fields(configuration: Res<Configuration>, stage: Res<StageTime>, mut fields: ResMut<CueFields>) {
-    fields.bring_to(Moment { load: configuration.load, time: stage.0 });
+    let moment = Moment { load: configuration.load, time: stage.0 };
+    fields.bring_to(moment, configuration.is_looked_at_here_and_there());
 }
 
 fn read_concentration(world: &World, index: usize) -> Vec<f64> {
@@ -212,7 +225,7 @@ fn read_concentration(world: &World, index: usize) -> Vec<f64> {
 fn read_sample(world: &World, index: usize, site: Site) -> (f64, Vector3<f64>) {
     let fields = world.resource::<CueFields>();
     let values = fields.at(index, Moment::of(world));
-    let sample = fields.sample_from(&world.resource::<Tissue>().mesh, index, &values, site);
+    let sample = fields.sample_from(&world.resource::<Tissue>().mesh, index, |i| values[i], site);
     (sample.concentration, sample.gradient)
 }
 
@@ -245,7 +258,7 @@ fn solve_demanded(world: &mut World) -> Result<(), InstallError> {
         counters.cue_factorisations += solved.factorisations as u64;
     }
     let names = chosen.into_iter().map(|(name, _)| name.to_owned()).collect();
-    let empty = |field: &FieldPath| Current { parameter: None, values: vec![0.0; field.path.components()] };
+    let empty = |_: &FieldPath| Current { parameter: None, values: Vec::new(), on_path: None };
     let current = solved.fields.iter().map(empty).collect();
     world.insert_resource(CueFields { names, solved, current });
     Ok(())
@@ -254,13 +267,14 @@ fn solve_demanded(world: &mut World) -> Result<(), InstallError> {
 /// Solves cues, one after the other.
 fn solve(world: &World, cues: &[(&str, &Cue)]) -> Result<Solved, InstallError> {
     let tissue = world.resource::<Tissue>();
-    let (mesh, rest) = (&*tissue.mesh, tissue.mesh.vertices());
+    let mesh = &*tissue.mesh;
     let goal = Refinement { tolerance: LEVEL_TOLERANCE, max_levels: MOST_LEVELS };
     let mut solvers = FieldSolvers::new(mesh, tissue.regions.values().cloned().collect());
     let loading = world.get_resource::<Loading>();
     let clock = world.resource::<Clock>();
-    let at_load = |load: f64| loading.map_or_else(Default::default, |loading| loading.configuration(rest, load));
-    let at_time = |time: f64| loading.map_or_else(Default::default, |loading| loading.motion(rest, time));
+    let at_load =
+        |load: f64| loading.map_or_else(Default::default, |loading| loading.configuration(&tissue.mesh, load));
+    let at_time = |time: f64| loading.map_or_else(Default::default, |loading| loading.motion(&tissue.mesh, time));
     let mut field = |(name, cue): &(&str, &Cue)| {
         let problem = cue.problem(tissue, name, mesh);
         let kinks = loading.map_or_else(Vec::new, Loading::kinks);
@@ -288,14 +302,15 @@ fn report(world: &mut World, (name, cue): (&str, &Cue), field: &FieldPath) {
         Along::Load => (format!("at {levels} load levels"), levels, Work::FieldUnknown),
     };
     let kind = if problem.order == Order::Quadratic { " of quadratic elements" } else { "" };
+    let few = levels > 1 && world.resource::<Configuration>().is_looked_at_here_and_there();
     let mut plan = world.resource_mut::<Plan>();
     plan.keep(format!("cue `{name}`"), format!("read; {unknowns} unknowns{kind}, solved {times}"));
     tell_margins(&mut plan, name, &problem, field);
     let part = format!("cue `{name}`");
-    let current = size_of::<f64>() * field.path.components();
+    let current = if few { 0 } else { size_of::<f64>() * field.path.components() };
     plan.hold(&part, (field.path.bytes() + current) as f64, Each::Run);
     plan.work(&part, work, (solves * unknowns) as f64, Each::Run);
-    if levels > 1 {
+    if levels > 1 && !few {
         plan.work(&part, Work::Interpolated, field.path.components() as f64, Each::Stage);
     }
 }

@@ -12,14 +12,16 @@ mod supports;
 
 pub use growth::{GrowingRegion, TissueGrowth};
 
+use crate::model::configuration::along_path;
 use crate::numerics::ellipticity::ellipticity_left;
 use crate::numerics::grown::Growth;
 use crate::numerics::hermite::Interpolation as Course;
 use crate::numerics::hyperelasticity::{Body, Prescribed};
 use crate::numerics::load_path::{LoadPath, LoadPathOptions};
 use crate::numerics::material::MaterialError;
+use crate::numerics::simplex_mesh::SimplexMesh;
+use crate::numerics::upright::stays_upright;
 use crate::prelude::*;
-use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use supports::{axis_of, hold_the_middle, outward_normal};
@@ -94,8 +96,6 @@ keys! {
 
 /// Bytes an unknown that solving takes: tangent, factor and what belongs to them. Ours, measured.
 const WORKSPACE: f64 = 2000.0;
-/// Vertices that are moved together.
-const AT_A_TIME: usize = 4096;
 
 impl EdgeMotion {
     /// Whether the edge leaves its place.
@@ -187,10 +187,16 @@ impl Matrix {
 
     /// Solves the load path on the mesh that the scene asks for, and takes it over to that of the tissue.
     fn solve(&self, tissue: &Tissue, law: Arc<dyn Material<2>>) -> Result<Equilibria, InstallError> {
-        let Some(size) = self.mesh_size else { return self.solve_on(tissue, law) };
-        let own = own_mesh::remeshed(tissue, size.0, &self.outlines())?;
-        let solved = self.solve_on(&own, law)?;
-        Ok(Equilibria { path: own_mesh::taken_over(&solved.path, &own, tissue)?, ..solved })
+        let solved = match self.mesh_size {
+            None => self.solve_on(tissue, law)?,
+            Some(size) => {
+                let own = own_mesh::remeshed(tissue, size.0, &self.outlines())?;
+                let solved = self.solve_on(&own, law)?;
+                Equilibria { path: own_mesh::taken_over(&solved.path, &own, tissue)?, ..solved }
+            }
+        };
+        let upright = stays_upright(&tissue.mesh, solved.path.path());
+        Ok(Equilibria { upright, ..solved })
     }
 
     fn solve_on(&self, tissue: &Tissue, law: Arc<dyn Material<2>>) -> Result<Equilibria, InstallError> {
@@ -210,7 +216,7 @@ impl Matrix {
         let largest = self.load.largest();
         path.displacement(largest, &mut farthest);
         let used = 1.0 - ellipticity_left(&body, largest, &farthest);
-        Ok(Equilibria { path, used, unknowns: body.unknowns() })
+        Ok(Equilibria { path, used, unknowns: body.unknowns(), upright: false })
     }
 }
 
@@ -251,7 +257,8 @@ impl Mechanism for Matrix {
         let tissue = model.world.resource::<Tissue>();
         let inputs = format!("{} {self:?}", tissue.inputs);
         let (equilibria, new) = model.world.resource::<Shelf>().take(&inputs, || self.solve(tissue, law))?;
-        let Equilibria { path, used, unknowns } = &*equilibria;
+        let Equilibria { path, used, unknowns, upright } = &*equilibria;
+        let upright = *upright;
         let duration = model.world.resource::<Clock>().grid.hours(model.world.resource::<Clock>().end);
         record(model.world, path, new);
         tell_kinks(model.world, &self.load);
@@ -275,12 +282,22 @@ impl Mechanism for Matrix {
         let mut plan = model.plan();
         plan.hold("matrix", held, Each::Run);
         plan.work("matrix", Work::NewtonUnknown, iterations, Each::Run);
-        // At each stage and at the step's end.
-        plan.work("matrix", Work::Moved, moved, Each::Stage);
-        plan.work("matrix", Work::Moved, moved, Each::Step);
         let curve = self.load.clone();
         model.insert(Loading { equilibria, inputs, curve, duration }).insert_law(self);
-        model.motion(follow_load);
+        if upright {
+            model.upright_motion(follow_load);
+        } else {
+            model.motion(follow_load);
+        }
+        model.at_end(move |world| {
+            if !world.resource::<Configuration>().is_looked_at_here_and_there() {
+                // At each stage and at the step's end.
+                let mut plan = world.resource_mut::<Plan>();
+                plan.work("matrix", Work::Moved, moved, Each::Stage);
+                plan.work("matrix", Work::Moved, moved, Each::Step);
+            }
+            Ok(())
+        });
         Ok(())
     }
 }
@@ -345,6 +362,8 @@ struct Equilibria {
     used: f64,
     /// Unknowns of a solve.
     unknowns: usize,
+    /// Whether no cell is ever turned over, for certain.
+    upright: bool,
 }
 
 /// The solved load path, and the load over time.
@@ -388,36 +407,13 @@ impl Loading {
     }
 
     /// Coordinates (µm) and velocities (µm/h) at a time (h); at a corner of the load curve those of the piece before.
-    pub fn motion(&self, rest: &[[f64; 2]], time: f64) -> (Vec<[f64; 2]>, Vec<[f64; 2]>) {
-        let (load, rate) = self.at(time);
-        let (mut moved, mut velocities) = (vec![[0.0; 2]; rest.len()], vec![[0.0; 2]; rest.len()]);
-        self.configure(rest, (load, rate), (&mut moved, &mut velocities));
-        (moved, velocities)
+    pub fn motion(&self, mesh: &Arc<SimplexMesh<2>>, time: f64) -> (Vec<[f64; 2]>, Vec<[f64; 2]>) {
+        along_path(mesh, self.path().path(), self.at(time))
     }
 
     /// Coordinates (µm) and their derivative with respect to the load, at a load.
-    pub fn configuration(&self, rest: &[[f64; 2]], load: f64) -> (Vec<[f64; 2]>, Vec<[f64; 2]>) {
-        let (mut moved, mut slope) = (vec![[0.0; 2]; rest.len()], vec![[0.0; 2]; rest.len()]);
-        self.configure(rest, (load, 1.0), (&mut moved, &mut slope));
-        (moved, slope)
-    }
-
-    /// Writes coordinates (µm) at a load, and their velocities (µm/h) where it grows at a rate (1/h).
-    fn configure(
-        &self,
-        rest: &[[f64; 2]],
-        (load, rate): (f64, f64),
-        (moved, velocities): (&mut [[f64; 2]], &mut [[f64; 2]]),
-    ) {
-        let path = self.path().path();
-        let place = path.locate(load);
-        let vertices = (rest, moved, velocities).into_par_iter().with_min_len(AT_A_TIME).enumerate();
-        vertices.for_each(|(vertex, (rest, x, v))| {
-            for k in 0..2 {
-                let (u, slope) = path.component(&place, 2 * vertex + k);
-                (x[k], v[k]) = (rest[k] + u, slope * rate);
-            }
-        });
+    pub fn configuration(&self, mesh: &Arc<SimplexMesh<2>>, load: f64) -> (Vec<[f64; 2]>, Vec<[f64; 2]>) {
+        along_path(mesh, self.path().path(), (load, 1.0))
     }
 }
 
@@ -436,8 +432,5 @@ fn follow_load(
     if configuration.revision > 0 && configuration.load == load && configuration.load_rate == rate {
         return;
     }
-    let Configuration { coordinates, velocities, .. } = &mut *configuration;
-    loading.configure(tissue.mesh.vertices(), (load, rate), (coordinates, velocities));
-    (configuration.load, configuration.load_rate) = (load, rate);
-    configuration.revision += 1;
+    configuration.follow(&tissue.mesh, loading.path().path(), (load, rate));
 }

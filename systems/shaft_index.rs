@@ -31,7 +31,7 @@ use rstar::{AABB, RTree, RTreeNode};
 use squares::{Listed, Square, Squares, corners, name, part_of, parts_near, square, squares_near, unname};
 
 type Entry = GeomWithData<[f64; 2], VertexId>;
-const _: () = assert!(BLOCK == u16::BITS as usize);
+const _: () = assert!(BLOCK <= u16::BITS as usize);
 
 /// The part of the plan that the index is.
 const PART: &str = "shaft index";
@@ -105,6 +105,8 @@ impl ShaftIndex {
             None => {
                 tell(model, reach, search);
                 model.world.resource_mut::<Shafts>().watch();
+                // How far a reach is at rest depends on every cell.
+                model.world.resource_mut::<Configuration>().is_looked_at_everywhere();
                 model.insert(ShaftIndex { search, reach, ..ShaftIndex::default() });
                 model.phase(Phase::Neighbours, index_new_vertices).rebuild(index_again);
             }
@@ -184,7 +186,7 @@ impl ShaftIndex {
 
     /// One list of all vertices: no cone is spared anything.
     fn list_everything(&mut self, scene: &ShaftScene) {
-        let all = |used: usize| if used == BLOCK { u16::MAX } else { (1 << used) - 1 };
+        let all = |used: usize| ((1u32 << used) - 1) as u16;
         let listed = |block| {
             let vertices = all(scene.shafts.block_vertices(block).len());
             Listed { block, vertices, parts: u16::MAX }
@@ -359,7 +361,7 @@ impl ShaftScene<'_> {
     /// Position of a material point now (µm).
     #[inline]
     fn position(&self, point: MaterialPoint<2>) -> [f64; 2] {
-        point.position(&self.tissue.mesh, &self.configuration.coordinates)
+        self.configuration.place(&self.tissue.mesh, point)
     }
 
     /// Positions now (µm) of a block's vertices and of the point after them; zeros for vertices not yet stored.

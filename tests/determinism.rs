@@ -6,6 +6,7 @@ use common::{ConeState, Fnv, cones, ended, hash_of_states, loaded, observed, rec
 use serde_json::{Value, json};
 use tropism::model::shafts::Shafts;
 use tropism::numerics::locate::MaterialPoint;
+use tropism::prelude::*;
 use tropism::scenario::load::Loaded;
 use tropism::study::seeds::over_seeds;
 use tropism::systems;
@@ -181,6 +182,49 @@ fn populations_and_cues_in_another_order_in_the_file_give_the_same_bits() {
     }
     assert_ne!(turned.to_string(), scene.to_string());
     assert_eq!(bits(&loaded(&turned, &roster)), bits(&loaded(&scene, &roster)));
+}
+
+keys! {
+    /// Looks at all of the tissue, and does nothing with it.
+    pub struct Overview {}
+}
+
+impl Mechanism for Overview {
+    const NAME: &'static str = "overview";
+
+    fn install(self, model: &mut ModelBuilder) -> Result<(), InstallError> {
+        model.world.resource_mut::<Configuration>().is_looked_at_everywhere();
+        model.insert_law(self);
+        Ok(())
+    }
+}
+
+#[test]
+fn a_tissue_that_is_reckoned_only_where_cones_are_gives_the_bits_of_one_that_is_brought_as_a_whole() {
+    let roster = systems::standard().with::<Overview>();
+    for (element, heading, method) in [("linear", "none", "rotation"), ("quadratic", "spin", "rk4")] {
+        let mut scene = scene(6, 6.0, false);
+        scene["tissue"]["mesh_size"] = json!(15);
+        scene["growth"] = json!({ "heading_follows": heading });
+        scene["time"]["method"] = json!(method);
+        scene["cues"]["repellent"]["element"] = json!(element);
+        let mut run = |overview: Value| {
+            scene["overview"] = overview;
+            let (trajectories, simulation) = observed(&loaded(&scene, &roster), &roster);
+            let now = simulation.world().resource::<Configuration>();
+            let brought: Vec<[u64; 4]> = now
+                .coordinates()
+                .iter()
+                .zip(&*now.velocities())
+                .map(|(x, v)| [x[0], x[1], v[0], v[1]].map(f64::to_bits))
+                .collect();
+            let state = hash_of_states(simulation.world());
+            (now.is_looked_at_here_and_there(), (trajectories, state, brought))
+        };
+        let ((few, here_and_there), (many, everywhere)) = (run(Value::Null), run(json!({})));
+        assert!(few && !many && here_and_there.0.lines().count() > 20);
+        assert!(here_and_there == everywhere, "{element} {heading} {method}");
+    }
 }
 
 #[test]

@@ -60,14 +60,16 @@ fn spoil_site(since: Res<Since>, clock: Res<Clock>, mut cones: Query<&mut Site, 
 fn turn_cell_over(since: Res<Since>, stage: Res<StageTime>, tissue: Res<Tissue>, mut now: ResMut<Configuration>) {
     if stage.0 > since.0 {
         let [a, b, c] = [0, 1, 2].map(|k| tissue.mesh.cell(7)[k] as usize);
-        let mirrored = |k: usize| now.coordinates[b][k] + now.coordinates[c][k] - now.coordinates[a][k];
-        now.coordinates[a] = [mirrored(0), mirrored(1)];
+        let [at_a, at_b, at_c] = [a, b, c].map(|vertex| now.vertex(vertex));
+        let mirrored = |k: usize| at_b[k] + at_c[k] - at_a[k];
+        now.displace(a, [mirrored(0), mirrored(1)]);
     }
 }
 
 fn lose_vertex(since: Res<Since>, stage: Res<StageTime>, mut now: ResMut<Configuration>) {
     if stage.0 > since.0 {
-        now.coordinates[3][1] = f64::INFINITY;
+        let [x, _] = now.vertex(3);
+        now.displace(3, [x, f64::INFINITY]);
     }
 }
 

@@ -3,10 +3,12 @@
 use super::adaptive::AdaptiveSteps;
 use super::clock::Clock;
 use super::components::{GrowthCone, Journey, Position, Site, SpringState, Status, Velocity};
+use super::configuration::Configuration;
 use super::movers::{ConeQuery, StepStart};
 use super::shafts::Shafts;
-use super::tissue::{Configuration, Tissue};
+use super::tissue::Tissue;
 use crate::kept;
+use crate::numerics::coordinates::AtVertices;
 use crate::numerics::simplex_mesh::BorderFacet;
 use bevy_ecs::prelude::{Component, Query, Res, ResMut, Resource, With, World};
 use nalgebra::Vector3;
@@ -71,8 +73,8 @@ impl BirthQueue {
 }
 
 /// Inner unit normal of a border facet at given coordinates.
-pub fn inner_normal(tissue: &Tissue, coordinates: &[[f64; 2]], facet: BorderFacet) -> Vector3<f64> {
-    let ends: Vec<_> = tissue.mesh.facet_vertices(facet).map(|v| coordinates[v as usize]).collect();
+pub fn inner_normal(tissue: &Tissue, coordinates: &(impl AtVertices<2> + ?Sized), facet: BorderFacet) -> Vector3<f64> {
+    let ends: Vec<_> = tissue.mesh.facet_vertices(facet).map(|v| coordinates.at(v as usize)).collect();
     let along = [ends[1][0] - ends[0][0], ends[1][1] - ends[0][1]];
     let length = along[0].hypot(along[1]);
     Vector3::new(-along[1] / length, along[0] / length, 0.0)
@@ -167,7 +169,7 @@ pub fn give_birth(
     for &(_, index) in due {
         let i = index as usize;
         let heading = match origins[i].heading {
-            FirstHeading::InnerNormal(facet) => inner_normal(&tissue, &configuration.coordinates, facet),
+            FirstHeading::InnerNormal(facet) => inner_normal(&tissue, &*configuration, facet),
             FirstHeading::Fixed(heading) => heading,
         };
         let place = (origins[i].site, configuration.position(&tissue.mesh, origins[i].site));

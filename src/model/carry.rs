@@ -5,8 +5,9 @@
 
 use super::components::{GrowthCone, Site, Velocity};
 use super::cones::Cones;
+use super::configuration::Configuration;
 use super::growth::Growth;
-use super::tissue::{Configuration, Tissue};
+use super::tissue::Tissue;
 use bevy_ecs::prelude::{Query, Res, With};
 
 /// Writes v_φ of each cone.

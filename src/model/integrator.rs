@@ -10,6 +10,7 @@
 use super::adaptive::{adaptive_step, idle_until};
 use super::clock::{Clock, StageTime};
 use super::components::Status;
+use super::configuration::Configuration;
 use super::explicit::explicit_step;
 use super::growth::{Growth, Method};
 use super::health::{Counters, Health};
@@ -17,7 +18,7 @@ use super::movers::{ConeQuery, Mover, Step, StepStart, each_growing};
 use super::schedule::{MotionSchedule, RightHandSide};
 use super::shafts::Shafts;
 use super::stopwatch::Stopwatch;
-use super::tissue::{Configuration, Tissue};
+use super::tissue::Tissue;
 use crate::numerics::runge_kutta::{BOGACKI_SHAMPINE, EULER, HEUN, RK4};
 use crate::numerics::turning::{rotate_in_plane, turn};
 use bevy_ecs::prelude::{Local, World};
@@ -82,8 +83,13 @@ fn report_lost_cones(world: &mut World, starts: &[StepStart]) {
 pub fn bring_tissue_to(world: &mut World, time: f64) {
     world.resource_mut::<Stopwatch>().lap("integrate");
     world.insert_resource(StageTime(time));
-    world.resource_scope::<MotionSchedule, _>(|world, mut motion| motion.0.run(world));
-    report_broken_tissue(world);
+    let watched = world.resource_scope::<MotionSchedule, _>(|world, mut motion| {
+        motion.schedule.run(world);
+        motion.cells_may_turn_over
+    });
+    if watched {
+        report_broken_tissue(world);
+    }
     world.resource_mut::<Stopwatch>().lap("matrix motion");
 }
 
@@ -131,8 +137,7 @@ fn finish_rotation(step: &Step, mover: &mut Mover) {
     let speed = mover.cone.speed * spring.speed_factor;
     let displacement = (before + after) * (0.5 * speed * duration);
     let from = mover.start.site;
-    let coordinates = &step.configuration.coordinates;
-    step.travel(mover, from, coordinates, displacement, speed * duration);
+    step.travel(mover, from, step.configuration, displacement, speed * duration);
 }
 
 fn spun(heading: Vector3<f64>, angle: Vector3<f64>, planar: bool) -> Vector3<f64> {

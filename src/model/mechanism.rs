@@ -197,8 +197,21 @@ impl<'a> ModelBuilder<'a> {
         self
     }
 
+    /// As [`Self::motion`], for a system that is known to turn no cell over: nobody looks after it.
+    pub(crate) fn upright_motion<Marker>(
+        &mut self,
+        system: impl IntoScheduleConfigs<ScheduleSystem, Marker>,
+    ) -> &mut Self {
+        self.moved_by(system)
+    }
+
     /// Runs a system that brings the tissue to the [stage time](super::clock::StageTime).
     pub fn motion<Marker>(&mut self, system: impl IntoScheduleConfigs<ScheduleSystem, Marker>) -> &mut Self {
+        self.schedules.cells_may_turn_over = true;
+        self.moved_by(system)
+    }
+
+    fn moved_by<Marker>(&mut self, system: impl IntoScheduleConfigs<ScheduleSystem, Marker>) -> &mut Self {
         let slot = Slot::Motion(self.slot);
         let schedule = &mut self.schedules.motion;
         schedule.configure_sets(after(slot, (0..self.slot).map(Slot::Motion)).in_set(Motion::Matrix));

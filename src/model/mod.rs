@@ -7,6 +7,7 @@ pub mod carry;
 pub mod clock;
 pub mod components;
 pub mod cones;
+pub mod configuration;
 mod explicit;
 pub mod growth;
 pub mod health;

@@ -3,8 +3,10 @@
 use super::brownian::HeadingPaths;
 use super::clock::Clock;
 use super::components::{GrowthCone, Journey, Position, Site, SpringState, Status, Velocity};
+use super::configuration::Configuration;
 use super::growth::{Growth, OnBorder, Targets};
-use super::tissue::{Configuration, Tissue};
+use super::tissue::Tissue;
+use crate::numerics::coordinates::AtVertices;
 use crate::numerics::turning::kick;
 use crate::numerics::walk::{BorderRule, Walk, WalkEnd, WalkError, WalkRules, nowhere, walk};
 use bevy_ecs::prelude::{QueryState, With, World};
@@ -106,8 +108,13 @@ impl Step<'_> {
     /// Puts a cone at a trial site for sampling: `forward` (µm, spatial) from where it is, without leaving the tissue.
     pub(super) fn place(&self, mover: &mut Mover, forward: Vector3<f64>) {
         mover.spring.clear();
-        let coordinates = &self.configuration.coordinates;
-        match walk(&self.tissue.mesh, coordinates, mover.site.planar(), flat(forward), &nowhere(BorderRule::Slide)) {
+        match walk(
+            &self.tissue.mesh,
+            self.configuration,
+            mover.site.planar(),
+            flat(forward),
+            &nowhere(BorderRule::Slide),
+        ) {
             Ok(walked) => *mover.site = walked.point.into(),
             Err(fault) => mover.start.fault = Some(fault),
         }
@@ -142,7 +149,7 @@ impl Step<'_> {
         &self,
         mover: &mut Mover,
         from: Site,
-        coordinates: &[[f64; 2]],
+        coordinates: &(impl AtVertices<2> + ?Sized),
         displacement: Vector3<f64>,
         length: f64,
     ) {

@@ -4,8 +4,9 @@
 use super::births::{Altered, AlteredColumns};
 use super::clock::Clock;
 use super::components::{GrowthCone, Journey, Position, Site, SpringState, Status, Velocity};
+use super::configuration::Configuration;
 use super::shafts::{ShaftPoint, Shafts, VertexId};
-use super::tissue::{Configuration, Tissue};
+use super::tissue::Tissue;
 use crate::kept;
 use crate::numerics::walk::{BorderRule, nowhere, walk};
 use bevy_ecs::prelude::{Query, Res, ResMut, Resource, With};
@@ -295,9 +296,9 @@ impl Remodelling<'_, '_> {
 
     /// The site that lies `by` (µm, spatial) from another, inside the tissue.
     pub fn walked(&self, from: Site, by: Vector3<f64>) -> Site {
-        let coordinates = &self.configuration.coordinates;
         let rules = nowhere(BorderRule::Slide);
-        walk(&self.tissue.mesh, coordinates, from.planar(), [by.x, by.y], &rules).map_or(from, |end| end.point.into())
+        walk(&self.tissue.mesh, &*self.configuration, from.planar(), [by.x, by.y], &rules)
+            .map_or(from, |end| end.point.into())
     }
 
     /// Lays a shaft anew after its first `kept` stored vertices (at least one): `points` and then the tip. Consecutive points lie at most

@@ -69,7 +69,12 @@ struct StageLabel;
 
 /// The schedule that brings the tissue to the stage's time.
 #[derive(Resource)]
-pub struct MotionSchedule(pub Schedule);
+pub struct MotionSchedule {
+    /// What moves the tissue.
+    pub schedule: Schedule,
+    /// Whether any of it is not known to turn no cell over.
+    pub cells_may_turn_over: bool,
+}
 
 /// The schedule of one stage.
 #[derive(Resource)]
@@ -81,6 +86,8 @@ pub struct Schedules {
     pub step: Schedule,
     /// The tissue's motion.
     pub motion: Schedule,
+    /// See [`MotionSchedule`].
+    pub cells_may_turn_over: bool,
     /// One stage.
     pub right_hand_side: Schedule,
 }
@@ -120,7 +127,7 @@ impl Schedules {
                 None => right_hand_side.add_systems(after),
             };
         }
-        Self { step, motion: strict(MotionLabel), right_hand_side }
+        Self { step, motion: strict(MotionLabel), cells_may_turn_over: false, right_hand_side }
     }
 
     /// Builds the schedules and checks that no two systems conflict without an order.

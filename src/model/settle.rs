@@ -2,9 +2,10 @@
 
 use super::clock::Clock;
 use super::components::{GrowthCone, Position, Site, SpringState, Status};
+use super::configuration::Configuration;
 use super::health::Health;
 use super::shafts::Shafts;
-use super::tissue::{Configuration, Tissue};
+use super::tissue::Tissue;
 use bevy_ecs::prelude::{Query, Res, ResMut, With};
 
 /// Lengthens the shaft of each cone that moved in this step and updates its position.

@@ -16,7 +16,7 @@ use bevy_ecs::prelude::Resource;
 use blocks::{Block, Blocks};
 
 /// Vertices a block.
-pub const BLOCK: usize = 16;
+pub const BLOCK: usize = 8;
 const NONE: u32 = u32::MAX;
 
 /// Number of a stored vertex: its place among those that all blocks have room for.

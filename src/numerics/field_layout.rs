@@ -27,14 +27,19 @@ pub enum FieldLayout {
 }
 
 impl FieldLayout {
-    /// c and ∇c in a cell at barycentric `weights`, from the field's vector. c may be negative.
+    /// c and ∇c in a cell at barycentric `weights`, from the components of the field's vector. c may be negative.
     #[inline]
-    pub fn sample(&self, mesh: &SimplexMesh<2>, values: &[f64], (cell, weights): (usize, [f64; 3])) -> (f64, [f64; 2]) {
-        let Self::Vertices = self else { return self.sample_other(mesh, values, (cell, weights)) };
+    pub fn sample(
+        &self,
+        mesh: &SimplexMesh<2>,
+        value: impl Fn(usize) -> f64,
+        (cell, weights): (usize, [f64; 3]),
+    ) -> (f64, [f64; 2]) {
+        let Self::Vertices = self else { return self.sample_other(mesh, value, (cell, weights)) };
         let mut sum = [0.0; STRIDE];
         for (weight, &corner) in weights.into_iter().zip(mesh.cell(cell)) {
             let at = corner as usize * STRIDE;
-            (0..STRIDE).for_each(|k| sum[k] += weight * values[at + k]);
+            (0..STRIDE).for_each(|k| sum[k] += weight * value(at + k));
         }
         (sum[0], [sum[1], sum[2]])
     }
@@ -43,12 +48,12 @@ impl FieldLayout {
     fn sample_other(
         &self,
         mesh: &SimplexMesh<2>,
-        values: &[f64],
+        value: impl Fn(usize) -> f64,
         (cell, weights): (usize, [f64; 3]),
     ) -> (f64, [f64; 2]) {
         let shape = shape::<2>(&[weights[0], weights[1], weights[2], 0.0]);
         let sum = |places: &[u32], shares: &[f64], (first, stride): (usize, usize)| -> f64 {
-            places.iter().zip(shares).map(|(&place, share)| share * values[first + stride * place as usize]).sum()
+            places.iter().zip(shares).map(|(&place, share)| share * value(first + stride * place as usize)).sum()
         };
         match self {
             Self::Vertices => {
@@ -57,7 +62,7 @@ impl FieldLayout {
             }
             Self::Cells(vertices) => {
                 let gradient = vertices + 2 * cell;
-                (sum(mesh.cell(cell), &weights, (0, 1)), [values[gradient], values[gradient + 1]])
+                (sum(mesh.cell(cell), &weights, (0, 1)), [value(gradient), value(gradient + 1)])
             }
             Self::Nodes(nodes) => {
                 let at = |k| sum(nodes.cell(cell), &shape, (k, STRIDE));
@@ -141,7 +146,7 @@ mod tests {
                 let weights = [0.2, 0.5, 0.3];
                 let corners = mesh.cell(cell).iter().map(|&v| mesh.vertices()[v as usize]);
                 let x = corners.zip(weights).fold([0.0; 2], |x, (v, w)| [x[0] + w * v[0], x[1] + w * v[1]]);
-                let (value, gradient) = layout.sample(&mesh, &values, (cell, weights));
+                let (value, gradient) = layout.sample(&mesh, |i| values[i], (cell, weights));
                 assert!((value - field(x)).abs() < 1e-14);
                 assert!((0..2).all(|k| (gradient[k] - slope(x)[k]).abs() < 1e-13), "{gradient:?}");
             }

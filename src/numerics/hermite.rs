@@ -118,6 +118,24 @@ impl HermitePath {
         self.levels[0].value.len()
     }
 
+    /// Number of parts: those between neighbouring levels, or one where there is a single level.
+    pub fn parts(&self) -> usize {
+        (self.levels.len() - 1).max(1)
+    }
+
+    /// The four coefficients in Bernstein form of a component over a part.
+    pub fn bernstein(&self, part: usize, component: usize) -> [f64; 4] {
+        let (from, to) = (&self.levels[part], &self.levels[(part + 1).min(self.levels.len() - 1)]);
+        let (first, last) = (from.value[component], to.value[component]);
+        let third = (to.parameter - from.parameter) / 3.0;
+        match self.interpolation {
+            Interpolation::Cubic => {
+                [first, first + third * from.slope[component], last - third * to.slope[component], last]
+            }
+            Interpolation::Linear => [first, (2.0 * first + last) / 3.0, (first + 2.0 * last) / 3.0, last],
+        }
+    }
+
     /// Bytes that the levels take.
     pub fn bytes(&self) -> usize {
         self.levels.iter().map(|level| size_of_val(&level.value[..]) + size_of_val(&level.slope[..])).sum()
@@ -154,6 +172,16 @@ impl HermitePath {
         let (from, to) = (&self.levels[weights.from], &self.levels[weights.to]);
         let data = [from.value[component], from.slope[component], to.value[component], to.slope[component]];
         (combine(&weights.value, data), combine(&weights.derivative, data))
+    }
+
+    /// [`Self::component`] without the derivative.
+    #[inline]
+    pub fn value(&self, weights: &HermiteWeights, component: usize) -> f64 {
+        let (from, to) = (&self.levels[weights.from], &self.levels[weights.to]);
+        combine(
+            &weights.value,
+            [from.value[component], from.slope[component], to.value[component], to.slope[component]],
+        )
     }
 
     /// Writes the vector at a parameter into `out`; constant outside the levels.

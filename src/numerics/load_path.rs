@@ -18,6 +18,7 @@ use crate::numerics::hermite::{
 };
 use crate::numerics::hyperelasticity::{Body, WorstCell};
 use crate::numerics::newton::{Equilibrium, EquilibriumError, NewtonOptions, equilibrium};
+use std::sync::Arc;
 
 /// How a load path is solved.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -118,7 +119,7 @@ pub struct LoadPathReport {
 /// Displacement of a body as a function of the load, with its derivative.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LoadPath {
-    path: HermitePath,
+    path: Arc<HermitePath>,
     report: LoadPathReport,
 }
 
@@ -132,7 +133,7 @@ impl LoadPath {
         let marched = HermitePath::new(solver.march()?)?.interpolated(options.interpolation);
         let (path, refinement) = solver.refine(marched)?;
         let report = solver.finish(&path, refinement)?;
-        Ok(Self { path, report })
+        Ok(Self { path: Arc::new(path), report })
     }
 
     /// Writes the displacement (µm, flat, stride `D`) at load `s` into `out`; constant outside `[0, 1]`.
@@ -148,11 +149,11 @@ impl LoadPath {
 
     /// The path of what a linear map makes of the displacement (µm, flat), as that on another mesh; its report stays.
     pub fn mapped(&self, map: impl Fn(&[f64]) -> Vec<f64>) -> Self {
-        Self { path: self.path.mapped(map), report: self.report.clone() }
+        Self { path: Arc::new(self.path.mapped(map)), report: self.report.clone() }
     }
 
     /// The interpolant, for those who need a few components only.
-    pub fn path(&self) -> &HermitePath {
+    pub fn path(&self) -> &Arc<HermitePath> {
         &self.path
     }
 

@@ -3,6 +3,7 @@
 //! A [`MaterialPoint`] is a cell and barycentric weights: as the tissue moves, its position follows without work or drift.
 //! A [`SeedGrid`] finds the material point at an arbitrary position.
 
+use crate::numerics::coordinates::AtVertices;
 use crate::numerics::simplex_mesh::SimplexMesh;
 use crate::numerics::vector::{between, dot};
 
@@ -31,7 +32,7 @@ impl<const D: usize> MaterialPoint<D> {
 
     /// Position at the given vertex coordinates (µm): `x = Σ λ_i x_i`.
     #[inline]
-    pub fn position(&self, mesh: &SimplexMesh<D>, coordinates: &[[f64; D]]) -> [f64; D] {
+    pub fn position(&self, mesh: &SimplexMesh<D>, coordinates: &(impl AtVertices<D> + ?Sized)) -> [f64; D] {
         self.interpolate_vector(mesh, coordinates)
     }
 
@@ -44,12 +45,15 @@ impl<const D: usize> MaterialPoint<D> {
 
     /// Value at the point of a vector given at the vertices.
     #[inline]
-    pub fn interpolate_vector<const N: usize>(&self, mesh: &SimplexMesh<D>, values: &[[f64; N]]) -> [f64; N] {
+    pub fn interpolate_vector<const N: usize>(
+        &self,
+        mesh: &SimplexMesh<D>,
+        values: &(impl AtVertices<N> + ?Sized),
+    ) -> [f64; N] {
         let corners = mesh.cell(self.cell as usize);
-        let base = values[corners[0] as usize];
-        std::array::from_fn(|k| {
-            (0..D).map(|i| self.weights[i] * (values[corners[i + 1] as usize][k] - base[k])).sum::<f64>() + base[k]
-        })
+        let base = values.at(corners[0] as usize);
+        let others: [[f64; N]; D] = std::array::from_fn(|i| values.at(corners[i + 1] as usize));
+        std::array::from_fn(|k| (0..D).map(|i| self.weights[i] * (others[i][k] - base[k])).sum::<f64>() + base[k])
     }
 
     /// All weights, vertex 0 first.

@@ -5,6 +5,7 @@
 //!
 //! Cells are stored flat with stride `D + 1`. Face `i` of a cell is the one opposite its local vertex `i`.
 
+use crate::numerics::coordinates::AtVertices;
 /// Marks "no neighbour" in [`SimplexMesh::neighbour`]: the face lies on the border of the domain.
 pub const BORDER: u32 = u32::MAX;
 
@@ -220,11 +221,11 @@ impl<const D: usize> SimplexMesh<D> {
     }
 
     /// Edge vectors of a cell from its vertex 0: column `i` is `x_{i+1} − x_0` (µm), at the given coordinates.
-    pub fn edge_vectors(&self, coordinates: &[[f64; D]], cell: usize) -> [[f64; D]; D] {
+    pub fn edge_vectors(&self, coordinates: &(impl AtVertices<D> + ?Sized), cell: usize) -> [[f64; D]; D] {
         let corners = self.cell(cell);
-        let origin = coordinates[corners[0] as usize];
+        let origin = coordinates.at(corners[0] as usize);
         std::array::from_fn(|i| {
-            let x = coordinates[corners[i + 1] as usize];
+            let x = coordinates.at(corners[i + 1] as usize);
             std::array::from_fn(|k| x[k] - origin[k])
         })
     }
@@ -238,7 +239,12 @@ impl<const D: usize> SimplexMesh<D> {
     /// Gradients of the `D + 1` barycentric coordinates of a cell (1/µm), written into `gradients`, and its signed volume.
     ///
     /// `gradients` has `D + 1` rows; row `i` is ∇λ_i. They sum to zero.
-    pub fn barycentric_gradients(&self, coordinates: &[[f64; D]], cell: usize, gradients: &mut [[f64; D]]) -> f64 {
+    pub fn barycentric_gradients(
+        &self,
+        coordinates: &(impl AtVertices<D> + ?Sized),
+        cell: usize,
+        gradients: &mut [[f64; D]],
+    ) -> f64 {
         let edges = self.edge_vectors(coordinates, cell);
         let det = determinant(&edges);
         gradients[0] = [0.0; D];

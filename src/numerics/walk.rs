@@ -9,6 +9,7 @@
 //! projections on the border facets (and, in space, on their common lines) there: so sliding follows straight borders,
 //! turns round re-entrant corners, and stops in convex ones. Points never leave the mesh.
 
+use crate::numerics::coordinates::AtVertices;
 use crate::numerics::locate::{MaterialPoint, Weights};
 use crate::numerics::simplex_mesh::{BORDER, SimplexMesh};
 use crate::numerics::vector::{dot, norm, without};
@@ -115,7 +116,7 @@ pub enum WalkError {
 /// A start that is not in the mesh, values that are not finite, a cell without positive volume.
 pub fn walk<const D: usize>(
     mesh: &SimplexMesh<D>,
-    coordinates: &[[f64; D]],
+    coordinates: &(impl AtVertices<D> + ?Sized),
     from: MaterialPoint<D>,
     displacement: [f64; D],
     rules: &WalkRules<impl Fn(u32) -> bool>,
@@ -153,9 +154,9 @@ pub fn walk<const D: usize>(
     Err(WalkError::Lost { cell: walker.cell, hops: limit })
 }
 
-struct Walker<'a, const D: usize> {
+struct Walker<'a, const D: usize, C: ?Sized> {
     mesh: &'a SimplexMesh<D>,
-    coordinates: &'a [[f64; D]],
+    coordinates: &'a C,
     wanted: [f64; D],
     heading: [f64; D],
     cell: u32,
@@ -190,7 +191,7 @@ struct Wall<const D: usize> {
     outward: [f64; D],
 }
 
-impl<const D: usize> Walker<'_, D> {
+impl<const D: usize, C: AtVertices<D> + ?Sized> Walker<'_, D, C> {
     fn gradients(&self, cell: u32) -> Result<([[f64; D]; 4], f64), WalkError> {
         let mut gradients = [[0.0; D]; 4];
         let volume = self.mesh.barycentric_gradients(self.coordinates, cell as usize, &mut gradients[..=D]);

@@ -3,10 +3,11 @@
 use crate::kept;
 use crate::model::clock::Clock;
 use crate::model::components::{GrowthCone, Journey, Site, SpringState, Status};
+use crate::model::configuration::Configuration;
 use crate::model::observables::{Effect, Observable, Observables};
 use crate::model::remodel::SpareCones;
 use crate::model::shafts::Shafts;
-use crate::model::tissue::{Configuration, Tissue};
+use crate::model::tissue::Tissue;
 use crate::record::measures::AxonRecord;
 use bevy_ecs::prelude::{With, World};
 use std::collections::BTreeMap;
@@ -71,7 +72,7 @@ impl Snapshot {
         let configuration = world.resource::<Configuration>();
         Self {
             time: world.resource::<Clock>().hours(),
-            vertices: configuration.coordinates.clone(),
+            vertices: configuration.coordinates().into_owned(),
             cells: tissue.mesh.cells().to_vec(),
             borders: borders(tissue, configuration),
             fields: fields(world),
@@ -124,8 +125,7 @@ impl Snapshot {
 pub fn shafts(world: &World) -> Vec<Vec<[f64; 2]>> {
     let (tissue, configuration) = (world.resource::<Tissue>(), world.resource::<Configuration>());
     let shafts = world.resource::<Shafts>();
-    let place =
-        |point: crate::numerics::locate::MaterialPoint<2>| point.position(&tissue.mesh, &configuration.coordinates);
+    let place = |point: crate::numerics::locate::MaterialPoint<2>| configuration.place(&tissue.mesh, point);
     (0..shafts.count())
         .map(|shaft| shafts.polyline(shaft).into_iter().map(place).collect::<Vec<_>>())
         .filter(|line| !line.is_empty())
@@ -237,7 +237,7 @@ pub fn target_vertices(tissue: &Tissue) -> Vec<(String, Vec<u32>)> {
 }
 
 fn places(vertices: &[u32], configuration: &Configuration) -> Vec<[f64; 2]> {
-    vertices.iter().map(|&vertex| configuration.coordinates[vertex as usize]).collect()
+    vertices.iter().map(|&vertex| configuration.vertex(vertex as usize)).collect()
 }
 
 /// The closed borders of a set of cells (ascending), as vertices with the first one repeated.
@@ -266,6 +266,7 @@ fn region_rings(tissue: &Tissue, cells: &[u32]) -> Vec<Vec<u32>> {
 
 /// Height of the tissue now: lowest and highest y (µm).
 pub fn extent_in_y(configuration: &Configuration) -> (f64, f64) {
-    let ys = configuration.coordinates.iter().map(|x| x[1]);
+    let coordinates = configuration.coordinates();
+    let ys = coordinates.iter().map(|x| x[1]);
     ys.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), y| (low.min(y), high.max(y)))
 }

@@ -12,6 +12,7 @@ pub use populate::BYTES_AN_AXON;
 use crate::model::adaptive::idle_until;
 use crate::model::clock::{Clock, StageTime};
 use crate::model::components::{GrowthCone, Status};
+use crate::model::configuration::Configuration;
 use crate::model::health::{Counters, Fault, Health};
 use crate::model::integrator::{bring_tissue_to, evaluate_right_hand_side};
 use crate::model::keep::Damage;
@@ -20,7 +21,6 @@ use crate::model::mechanism::Roster;
 use crate::model::remodel::Unrest;
 use crate::model::shelf::Shelf;
 use crate::model::stopwatch::Stopwatch;
-use crate::model::tissue::Configuration;
 use crate::scenario::load::Loaded;
 use bevy_ecs::prelude::{Schedule, With, World};
 

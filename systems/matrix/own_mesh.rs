@@ -38,10 +38,8 @@ pub fn taken_over(path: &LoadPath, from: &Tissue, tissue: &Tissue) -> Result<Loa
         places.iter().flat_map(|place| place.interpolate_vector(&from.mesh, &vectors)).collect()
     });
     for level in taken.path().levels() {
-        let mut moved = Configuration::at_rest(&tissue.mesh);
-        for (x, u) in moved.coordinates.iter_mut().zip(level.value.chunks_exact(2)) {
-            *x = [x[0] + u[0], x[1] + u[1]];
-        }
+        let displaced = tissue.mesh.vertices().iter().zip(level.value.chunks_exact(2));
+        let moved = Configuration::of_vertices(displaced.map(|(x, u)| [x[0] + u[0], x[1] + u[1]]).collect());
         if let Some(defect) = moved.defect(&tissue.mesh) {
             return Err(InstallError::Solve(format!(
                 "the matrix (eq. 3) was solved on a mesh of its own, whose displacements do not fit the tissue's: at load {:.3} {defect}; a \

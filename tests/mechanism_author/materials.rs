@@ -25,7 +25,7 @@ fn stretched(material: Value) -> Value {
 fn places(material: Value) -> Vec<[f64; 2]> {
     let mut simulation = assembled(&stretched(material), &roster());
     simulation.look_at(2.0);
-    simulation.world().resource::<Configuration>().coordinates.to_vec()
+    simulation.world().resource::<Configuration>().coordinates().to_vec()
 }
 
 #[test]

@@ -2,9 +2,10 @@
 
 use serde_json::{Value, json};
 use tropism::model::components::Site;
+use tropism::model::configuration::Configuration;
 use tropism::model::observables::Observables;
 use tropism::model::plan::Plan;
-use tropism::model::tissue::{Configuration, Tissue};
+use tropism::model::tissue::Tissue;
 use tropism::prelude::*;
 use tropism::systems::standard;
 

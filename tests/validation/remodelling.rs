@@ -6,9 +6,10 @@ use crate::mechanisms::{SPEED, at, measured, scene};
 use nalgebra::Vector3;
 use serde_json::{Value, json};
 use tropism::model::components::Status;
+use tropism::model::configuration::Configuration;
 use tropism::model::remodel::SpareCones;
 use tropism::model::shafts::Shafts;
-use tropism::model::tissue::{Configuration, Tissue};
+use tropism::model::tissue::Tissue;
 use tropism::systems::zippering::Zippers;
 
 fn born(cones: &[ConeState]) -> Vec<ConeState> {
@@ -19,7 +20,7 @@ fn born(cones: &[ConeState]) -> Vec<ConeState> {
 fn path(world: &bevy_ecs::prelude::World, shaft: usize) -> Vec<[f64; 2]> {
     let (tissue, configuration) = (world.resource::<Tissue>(), world.resource::<Configuration>());
     let points = world.resource::<Shafts>().polyline(shaft).into_iter();
-    points.map(|point| point.position(&tissue.mesh, &configuration.coordinates)).collect()
+    points.map(|point| configuration.place(&tissue.mesh, point)).collect()
 }
 
 fn angle(cone: &ConeState) -> f64 {

@@ -30,7 +30,7 @@ fn affine_map(world: &World) -> impl Fn([f64; 2]) -> [f64; 2] {
     let (tissue, configuration) = (world.resource::<Tissue>(), world.resource::<Configuration>());
     let gradient = configuration.deformation_gradient(&tissue.mesh, 0);
     let corner = tissue.mesh.cell(0)[0] as usize;
-    let (from, to) = (tissue.mesh.vertices()[corner], configuration.coordinates[corner]);
+    let (from, to) = (tissue.mesh.vertices()[corner], configuration.vertex(corner));
     move |x: [f64; 2]| {
         let offset = [x[0] - from[0], x[1] - from[1]];
         [0, 1].map(|i| to[i] + gradient[(i, 0)] * offset[0] + gradient[(i, 1)] * offset[1])

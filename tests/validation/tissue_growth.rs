@@ -28,7 +28,7 @@ fn at(scene: &Value, time: f64) -> Vec<([f64; 2], [f64; 2])> {
     simulation.look_at(time);
     let world = simulation.world();
     let (tissue, now) = (world.resource::<Tissue>(), world.resource::<Configuration>());
-    tissue.mesh.vertices().iter().copied().zip(now.coordinates.iter().copied()).collect()
+    tissue.mesh.vertices().iter().copied().zip(now.coordinates().iter().copied()).collect()
 }
 
 #[test]

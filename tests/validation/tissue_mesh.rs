@@ -25,7 +25,7 @@ fn half_way(scene: &Value) -> Vec<[f64; 4]> {
     let mut simulation = assembled(scene, &systems::standard());
     simulation.look_at(3.0);
     let now = simulation.world().resource::<Configuration>();
-    now.coordinates.iter().zip(&now.velocities).map(|(x, v)| [x[0], x[1], v[0], v[1]]).collect()
+    now.coordinates().iter().zip(&*now.velocities()).map(|(x, v)| [x[0], x[1], v[0], v[1]]).collect()
 }
 
 /// Root mean square of the distance between vertices, in the places `part` names (0 and 1: position, 2 and 3: velocity).

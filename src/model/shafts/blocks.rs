@@ -181,7 +181,7 @@ mod tests {
     }
 
     #[test]
-    fn a_block_takes_400_bytes() {
-        assert_eq!(Block::BYTES, 400);
+    fn a_block_takes_208_bytes() {
+        assert_eq!(Block::BYTES, 208);
     }
 }

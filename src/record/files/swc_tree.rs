@@ -1,10 +1,11 @@
 //! Axons as trees of points: the trunk from its origin to its tip, each branch on the point of its parent where it sprouted.
 
 use crate::model::components::GrowthCone;
+use crate::model::configuration::Configuration;
 use crate::model::growth::Populations;
 use crate::model::remodel::SpareCones;
 use crate::model::shafts::Shafts;
-use crate::model::tissue::{Configuration, Tissue};
+use crate::model::tissue::Tissue;
 use crate::numerics::locate::MaterialPoint;
 use bevy_ecs::prelude::{With, World};
 use std::collections::BTreeMap;
@@ -87,7 +88,7 @@ pub fn trees(world: &World) -> Vec<Tree> {
     let (shafts, spares) = (world.resource::<Shafts>(), world.resource::<SpareCones>());
     let mut axons: BTreeMap<u32, Vec<Line>> = BTreeMap::new();
     for cone in 0..shafts.count() as u32 {
-        let place = |point: MaterialPoint<2>| (point, point.position(&tissue.mesh, &configuration.coordinates));
+        let place = |point: MaterialPoint<2>| (point, configuration.place(&tissue.mesh, point));
         let points: Vec<_> = shafts.polyline(cone as usize).into_iter().map(place).collect();
         if !points.is_empty() {
             let line = Line { cone, parent: spares.parent(cone), points };

@@ -4,11 +4,12 @@ use super::super::output::{WriteError, clear_folder, write_atomically};
 use super::vtu::{CellKind, Grid, Values, escaped};
 use super::{Output, OutputError};
 use crate::model::clock::Clock;
+use crate::model::configuration::Configuration;
 use crate::model::keep::{Keep, KeptBytes};
 use crate::model::observables::Observables;
 use crate::model::remodel::SpareCones;
 use crate::model::shafts::Shafts;
-use crate::model::tissue::{Configuration, Tissue};
+use crate::model::tissue::Tissue;
 use bevy_ecs::prelude::World;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
@@ -77,7 +78,7 @@ fn mesh(world: &World) -> Grid {
     let (tissue, configuration) = (world.resource::<Tissue>(), world.resource::<Configuration>());
     let connectivity: Vec<i64> = tissue.mesh.cells().iter().map(|&vertex| i64::from(vertex)).collect();
     Grid {
-        points: configuration.coordinates.clone(),
+        points: configuration.coordinates().into_owned(),
         kind: CellKind::Triangle,
         connectivity,
         point_data: Vec::new(),
@@ -88,14 +89,15 @@ fn mesh(world: &World) -> Grid {
 /// The tissue: displacement and velocity of its vertices, and how much the area of each cell has grown.
 pub fn tissue(world: &World) -> Grid {
     let (tissue, configuration) = (world.resource::<Tissue>(), world.resource::<Configuration>());
-    let moved = configuration.coordinates.iter().zip(tissue.mesh.vertices());
+    let coordinates = configuration.coordinates();
+    let moved = coordinates.iter().zip(tissue.mesh.vertices());
     let displacement = moved.map(|(now, rest)| [now[0] - rest[0], now[1] - rest[1]]).collect();
     let ratio = |cell| configuration.deformation_gradient(&tissue.mesh, cell).determinant();
     let ratios = (0..tissue.mesh.cell_count() as u32).map(ratio).collect();
     Grid {
         point_data: vec![
             ("displacement [um]".to_owned(), Values::Vectors(displacement)),
-            ("velocity [um/h]".to_owned(), Values::Vectors(configuration.velocities.clone())),
+            ("velocity [um/h]".to_owned(), Values::Vectors(configuration.velocities().into_owned())),
         ],
         cell_data: vec![("area ratio".to_owned(), Values::Scalars(ratios))],
         ..mesh(world)
@@ -123,7 +125,7 @@ pub fn shafts(world: &World) -> Grid {
         if line.is_empty() {
             continue;
         }
-        points.extend(line.iter().map(|point| point.position(&tissue.mesh, &configuration.coordinates)));
+        points.extend(line.iter().map(|point| configuration.place(&tissue.mesh, *point)));
         times.extend(shafts.vertices(shaft).map(|vertex| f64::from(shafts.time(vertex))));
         times.push(f64::from(shafts.tip_time(number)));
         numbers.extend(std::iter::repeat_n(i64::from(number), line.len()));

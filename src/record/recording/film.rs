@@ -10,11 +10,12 @@ use super::{FULL, Header, NO_PARENT, RecordedBorder, RecordedCue, RecordedTarget
 use crate::kept;
 use crate::model::clock::Clock;
 use crate::model::components::{GrowthCone, Journey, Status};
+use crate::model::configuration::Configuration;
 use crate::model::growth::Populations;
 use crate::model::observables::{Effect, Observables};
 use crate::model::remodel::SpareCones;
 use crate::model::shafts::Shafts;
-use crate::model::tissue::{Configuration, Tissue};
+use crate::model::tissue::Tissue;
 use crate::record::snapshot::{border_vertices, target_vertices, tips};
 use bevy_ecs::prelude::{With, World};
 use std::collections::BTreeMap;
@@ -109,7 +110,7 @@ impl Film {
         self.times.push(time);
         let configuration = world.resource::<Configuration>();
         if configuration.moves || frame == 0 {
-            self.vertices.push(configuration.coordinates.iter().map(|x| x.map(|x| x as f32)).collect());
+            self.vertices.push(configuration.coordinates().iter().map(|x| x.map(|x| x as f32)).collect());
         }
         let observables = world.resource::<Observables>();
         self.cues.resize_with(observables.fields.len(), FilmedCue::default);

@@ -2,8 +2,9 @@
 
 use super::sequence::{Cost, Pilot, Sequence, errors};
 use super::{Found, difference, given};
+use crate::model::configuration::Configuration;
 use crate::model::plan::Plan;
-use crate::model::tissue::{Configuration, Tissue};
+use crate::model::tissue::Tissue;
 use crate::numerics::mesh_grading::LEAST_CORNER;
 use crate::numerics::polygon::bounding_box;
 use crate::scenario::load::Loaded;

@@ -9,10 +9,11 @@ use crate::model::births::{FirstHeading, Origin};
 use crate::model::brownian::HeadingPaths;
 use crate::model::clock::Clock;
 use crate::model::components::{GrowthCone, Site};
+use crate::model::configuration::Configuration;
 use crate::model::growth::{Growth, Targets};
 use crate::model::shafts::{Shafts, Successor, VertexId};
 use crate::model::stopwatch::Stopwatch;
-use crate::model::tissue::{Configuration, Tissue};
+use crate::model::tissue::Tissue;
 use crate::numerics::contact_integral::Felt;
 use crate::numerics::segments::{ContactPull, Contacts, Segments, Touch};
 use crate::numerics::turning::{kick, turn};
@@ -227,7 +228,7 @@ impl PlainLoop {
         let heading = turn(&cone.heading, &cone.pull, self.growth.turning_rate * half);
         let rules = nowhere(BorderRule::Slide);
         let (mesh, from) = (&self.tissue.mesh, cone.site.planar());
-        let walked = walk(mesh, &configuration.coordinates, from, [forward.x, forward.y], &rules);
+        let walked = walk(mesh, configuration, from, [forward.x, forward.y], &rules);
         (walked.map_or(cone.site, |walked| walked.point.into()), heading)
     }
 
@@ -247,7 +248,7 @@ impl PlainLoop {
         (site, margin): (Site, f64),
         (near, segments): (&mut Vec<VertexId>, &mut Segments<2>),
     ) {
-        let (mesh, coordinates, shafts) = (&self.tissue.mesh, &configuration.coordinates, &self.shafts);
+        let (mesh, coordinates, shafts) = (&self.tissue.mesh, configuration.coordinates(), &self.shafts);
         let at = self.tissue.reference_position(site);
         near.clear();
         self.grid.collect([at.x, at.y], margin + shafts.longest, near);
@@ -258,7 +259,7 @@ impl PlainLoop {
                 Successor::Vertex(next) => shafts.point(next),
                 Successor::Tip(shaft) => shafts.tip(shaft),
             };
-            let [a, b] = [shafts.point(vertex), end].map(|point| point.position(mesh, coordinates));
+            let [a, b] = [shafts.point(vertex), end].map(|point| point.position(mesh, &*coordinates));
             segments.push(a, b, (shafts.owner(vertex), 0));
         }
     }
@@ -284,7 +285,7 @@ impl PlainLoop {
             for facet in facets {
                 let corners = self.tissue.mesh.cell(facet.cell as usize);
                 let end = |k: usize| {
-                    let at = configuration.coordinates[corners[(facet.face as usize + k) % 3] as usize];
+                    let at = configuration.vertex(corners[(facet.face as usize + k) % 3] as usize);
                     Vector3::new(at[0], at[1], 0.0)
                 };
                 let (a, b) = (end(1), end(2));
@@ -318,8 +319,8 @@ impl PlainLoop {
         let after = kick(&before, [scale * self.paths.0.increment::<1>(cone.axon, start, to)[0], 0.0], true);
         let displacement = (before + after) * (0.5 * cone.speed * duration);
         let rules = WalkRules { border: BorderRule::Slide, stop_at: |cell: u32| self.targets.contains(cell) };
-        let (mesh, coordinates) = (&self.tissue.mesh, &configuration.coordinates);
-        let walked = walk(mesh, coordinates, cone.site.planar(), [displacement.x, displacement.y], &rules);
+        let mesh = &self.tissue.mesh;
+        let walked = walk(mesh, configuration, cone.site.planar(), [displacement.x, displacement.y], &rules);
         let mut cone = PlainCone { heading: turn(&after, &pull, half_turn), pull, ..*cone };
         if let Ok(walked) = walked {
             cone.site = walked.point.into();

@@ -2,7 +2,8 @@
 
 use super::work_precision::{ErrorKind, Factor, short};
 use crate::model::components::Site;
-use crate::model::tissue::{Configuration, Tissue};
+use crate::model::configuration::Configuration;
+use crate::model::tissue::Tissue;
 use crate::scenario::load::Loaded;
 use crate::simulation::Simulation;
 use crate::study::laboratory::{Laboratory, Setting, root_mean_square, spread_points};

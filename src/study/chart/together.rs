@@ -8,8 +8,8 @@
 
 use super::cones::MOST_AXONS;
 use super::work_precision::{ErrorKind, Factor, Point, short, time};
+use crate::model::configuration::Configuration;
 use crate::model::observables::Observables;
-use crate::model::tissue::Configuration;
 use crate::scenario::load::Loaded;
 use crate::study::accuracy::difference;
 use crate::study::laboratory::{

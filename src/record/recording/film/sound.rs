@@ -2,9 +2,10 @@
 
 use super::{Film, FilmedCue, STATUSES};
 use crate::model::clock::Clock;
+use crate::model::configuration::Configuration;
 use crate::model::observables::Observables;
 use crate::model::shafts::Shafts;
-use crate::model::tissue::{Configuration, Tissue};
+use crate::model::tissue::Tissue;
 use bevy_ecs::prelude::World;
 
 impl Film {

@@ -17,7 +17,7 @@
 //! not count; or where no refinement can be afforded. Some coarser places stand before those: they may be chosen, but
 //! do not count as agreement. A mesh that is chosen is graded toward re-entrant corners, without which it converges
 //! slowly (`numerics::mesh_grading`). The matrix of a tissue that moves is
-//! put on the coarsest mesh of its own that moves tips by no more than 0.2 ε.
+//! put, between the two sequences, on the coarsest mesh of its own that moves tips by no more than 0.2 ε, judged by a third one.
 //!
 //! The two sequences say where to look: pairs of places with √(e_Δt² + e_h²) ≤ 4 ε are tried in order of what the
 //! whole scene would take with them (a step that was bad on the middling mesh may be good on a finer one), and the

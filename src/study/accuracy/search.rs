@@ -42,6 +42,13 @@ const COARSER_STEPS: i32 = 2;
 const MOST_REFINEMENTS: i32 = 14;
 /// A mesh of more vertices than this is not tried.
 const MOST_VERTICES: f64 = 4e5;
+/// Nor one of the matrix' own of more.
+const MOST_MATRIX_VERTICES: f64 = 5e4;
+
+/// Vertices to be expected of a mesh of so many µm² with edges of so many µm.
+fn vertices(area: f64, size: f64) -> f64 {
+    1.155 * area / (size * size)
+}
 
 pub struct Search<'a> {
     laboratory: &'a Laboratory<'a>,
@@ -82,13 +89,6 @@ impl Judge {
     }
 }
 
-/// A mesh for the matrix alone (µm), and what Newton's method takes on it (ns).
-#[derive(Clone, Copy)]
-struct MatrixMesh {
-    size: f64,
-    newton: f64,
-}
-
 impl<'a> Search<'a> {
     pub fn new(laboratory: &'a Laboratory<'a>, scene: &'a Loaded, asked: f64) -> Self {
         let step = scene.scene.time.step.0;
@@ -111,8 +111,9 @@ impl<'a> Search<'a> {
         }
         let steps = if step_given { Sequence::fixed(self.step) } else { self.refined_steps(whole.longest_step)? };
         self.step = steps.values[steps.settled];
+        let by_matrix = self.settle_matrix()?;
         let meshes = if mesh_given { Sequence::fixed(0.0) } else { self.refined_meshes()? };
-        let (step, mesh, estimated) = self.cheapest(&steps, &meshes, &whole)?;
+        let (step, mesh, estimated) = self.cheapest(&steps, &meshes, (&whole, by_matrix))?;
         let (by_step, by_mesh) = (steps.errors[step], meshes.errors[mesh]);
         let mut set = self.keys();
         set.push("/accuracy=null".to_owned());
@@ -168,7 +169,7 @@ impl<'a> Search<'a> {
         self.refined(COARSER_MESHES, |search, place| {
             let ([width, height], size) = (search.extent(), search.mesh_size(place));
             search.mesh = Some(size);
-            (1.155 * width * height <= MOST_VERTICES * size * size).then_some(size)
+            (vertices(width * height, size) <= MOST_VERTICES).then_some(size)
         })
     }
 
@@ -217,7 +218,7 @@ impl<'a> Search<'a> {
         &mut self,
         steps: &Sequence,
         meshes: &Sequence,
-        whole: &Whole,
+        (whole, by_matrix): (&Whole, f64),
     ) -> Result<(usize, usize, f64), RunError> {
         let taken = if whole.share < 1.0 { TAKEN_OF_SOME } else { TAKEN };
         let both = |i: usize, j: usize| steps.errors[i].hypot(meshes.errors[j]);
@@ -227,13 +228,8 @@ impl<'a> Search<'a> {
         let mut pairs: Vec<_> = all.filter(|&(i, j)| both(i, j) <= TRIED * self.asked).collect();
         if steps.finest() + meshes.finest() > 0 && !pairs.is_empty() {
             self.put(steps, steps.finest(), meshes, meshes.finest());
-            let judge = Judge { finest: self.pilot()?, tail: steps.tail.hypot(meshes.tail) };
-            let matrix = self.coarser_matrix(&judge);
-            let time = |&(i, j): &(usize, usize)| {
-                let mesh = meshes.costs[j].rates;
-                let newton = matrix.map_or(mesh.newton, |matrix| matrix.newton.min(mesh.newton));
-                steps.costs[i].on(&Rates { newton, ..mesh }, whole.cone / whole.share)
-            };
+            let judge = Judge { finest: self.pilot()?, tail: steps.tail.hypot(meshes.tail).hypot(by_matrix) };
+            let time = |&(i, j): &(usize, usize)| steps.costs[i].on(&meshes.costs[j].rates, whole.cone / whole.share);
             pairs.sort_by(|a, b| time(a).total_cmp(&time(b)));
             let mut left = TRIALS * time(&(steps.finest(), meshes.finest()));
             for (step, mesh) in pairs {
@@ -242,33 +238,47 @@ impl<'a> Search<'a> {
                     break;
                 }
                 self.put(steps, step, meshes, mesh);
-                self.matrix_mesh =
-                    matrix.map(|matrix| matrix.size).filter(|size| self.mesh.is_some_and(|mesh| *size > mesh));
                 // A mesh on which there is no equilibrium is none to take.
                 let error = self.pilot().map_or(f64::INFINITY, |pilot| judge.error(&pilot));
                 if error <= taken * self.asked {
                     return Ok((step, mesh, error));
                 }
             }
-            self.matrix_mesh = None;
         }
         self.put(steps, step, meshes, mesh);
-        Ok((step, mesh, both(step, mesh)))
+        Ok((step, mesh, both(step, mesh).hypot(by_matrix)))
     }
 
-    /// The coarsest mesh for the matrix alone that moves tips by little; none where the scene has its own, or nothing moves.
-    fn coarser_matrix(&mut self, judge: &Judge) -> Option<MatrixMesh> {
+    /// Puts the coarsest mesh of the matrix' own that moves tips by little, judged on a middling mesh of the tissue; none where the scene has
+    /// its own, or nothing moves. Returns a bound of its error.
+    fn settle_matrix(&mut self) -> Result<f64, RunError> {
         let free = self.scene.blocks.contains_key("matrix") && !given(self.scene, "/matrix/mesh_size");
-        let finest = self.mesh.filter(|_| free && judge.finest.moves)?;
-        let sizes = std::iter::successors(Some(self.mesh_size(0)), |size| Some(0.5 * size));
-        let found = sizes.take_while(|size| *size >= 2.0 * finest).find_map(|size| {
+        if !free || self.mesh.is_none() {
+            return Ok(0.0);
+        }
+        let (goal, [width, height]) = (BY_MATRIX * self.asked, self.extent());
+        let (mut sizes, mut pilots): (Vec<f64>, Vec<Pilot>) = (Vec::new(), Vec::new());
+        for size in std::iter::successors(Some(self.mesh_size(0)), |size| Some(0.5 * size)) {
+            if vertices(width * height, size) > MOST_MATRIX_VERTICES {
+                break;
+            }
             self.matrix_mesh = Some(size);
-            let pilot = self.pilot().ok()?;
-            let near = difference(&pilot.tips, &judge.finest.tips) <= BY_MATRIX * self.asked;
-            near.then_some(MatrixMesh { size, newton: pilot.cost.rates.newton })
-        });
-        self.matrix_mesh = None;
-        found
+            let pilot = self.pilot()?;
+            if !pilot.moves {
+                self.matrix_mesh = None;
+                return Ok(0.0);
+            }
+            sizes.push(size);
+            pilots.push(pilot);
+            let errors = errors(&pilots);
+            if errors.len() >= 3 && errors[errors.len() - 3..].iter().all(|error| *error <= goal) {
+                break;
+            }
+        }
+        let errors = errors(&pilots);
+        let chosen = errors.iter().position(|error| *error <= goal).unwrap_or(errors.len().saturating_sub(1));
+        self.matrix_mesh = sizes.get(chosen).copied();
+        Ok(errors.get(chosen).copied().unwrap_or(0.0))
     }
 
     fn pilot(&mut self) -> Result<Pilot, RunError> {

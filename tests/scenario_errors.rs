@@ -357,6 +357,8 @@ fn a_problem_names_the_file_or_the_override_it_comes_from() {
             ("loop.json", r#"{"base": "pool.json"}"#),
             ("pool.json", r#"{"base": "loop.json"}"#),
             ("orphan.json", r#"{"base": "gone.json"}"#),
+            ("outside.json", r#"{"base": "../base.json"}"#),
+            ("elsewhere.json", r#"{"base": "/etc/hostname"}"#),
         ],
     );
     let expected = [
@@ -369,6 +371,11 @@ fn a_problem_names_the_file_or_the_override_it_comes_from() {
     assert_eq!(scenes.problems("top.json", &["/growth=3", "time/step=1"]), expected);
     assert_eq!(scenes.problems("loop.json", &[]), ["/base: (in pool.json) loop.json is a base of itself"]);
     assert_eq!(scenes.problems("orphan.json", &[]), ["/base: (in orphan.json) gone.json: no such file"]);
+    for (name, base) in [("outside.json", "../base.json"), ("elsewhere.json", "/etc/hostname")] {
+        let [problem] = scenes.problems(name, &[]).try_into().unwrap();
+        let refused = format!("/base: (in {name}) \"{base}\" is not the name of a file in the folder of the scenario");
+        assert!(problem.starts_with(&refused), "{problem}");
+    }
     assert_eq!(scenes.problems("absent.json", &[]), ["absent.json: no such file"]);
 }
 

@@ -10,6 +10,7 @@ use thiserror::Error;
 
 use super::checks::check_region;
 use super::expressions;
+use super::folder::inside;
 use super::merge::{idle_removals, merge, strip_nulls};
 use super::outline_file::take_in;
 use super::overrides;
@@ -168,11 +169,12 @@ fn read_chain(path: &Path) -> Result<Vec<Document>, Violation> {
         if !value.is_object() {
             return Err(named(name_file(&path, &format!("a scene is a JSON object, not {}", show(&value)))));
         }
-        next = match value.get("base") {
-            Some(Value::String(base)) => Some(path.parent().unwrap_or(Path::new("")).join(base)),
-            _ => None,
-        };
+        let folder = path.parent().unwrap_or(Path::new("")).to_owned();
+        let base = value.get("base").and_then(Value::as_str).map(str::to_owned);
         chain.push(Document { path, value });
+        next = base.map(|base| inside(&folder, &base)).transpose().map_err(|message| {
+            Violation::new("/base", format!("(in {}) {message}", chain[chain.len() - 1].path.display()))
+        })?;
     }
     Ok(chain)
 }

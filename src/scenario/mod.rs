@@ -12,6 +12,7 @@ pub mod editor_schema;
 pub mod excerpt;
 mod expressions;
 mod files;
+mod folder;
 pub mod load;
 pub mod merge;
 pub mod outline_file;

@@ -8,6 +8,7 @@ mod gmsh;
 mod naming;
 mod svg;
 
+use super::folder::inside;
 use super::merge::strip_nulls;
 use super::read::read_text;
 use crate::keys;
@@ -16,7 +17,7 @@ use crate::model::violation::Violation;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
-use std::path::{Component, Path, PathBuf};
+use std::path::Path;
 
 /// Points of an outline from a file, with those of the lines that name its sides.
 const MOST_POINTS: usize = 20_000;
@@ -143,22 +144,9 @@ pub fn polygon(filed: &FiledOutline, text: &str) -> Result<Value, String> {
 
 /// The text of a file inside a folder.
 fn read_inside(folder: &Path, file: &str) -> Result<String, String> {
-    let path = Path::new(file);
-    let inside = path.components().all(|part| matches!(part, Component::Normal(_) | Component::CurDir));
-    if file.is_empty() || !inside {
-        return Err(format!(
-            "\"{file}\" is not the name of a file in the folder of the scenario, such as \"tissue.svg\" or \"shapes/tissue.svg\""
-        ));
-    }
-    let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
-    let unreadable = |error: std::io::Error| match error.kind() {
-        std::io::ErrorKind::NotFound => format!("{file}: no such file beside the scenario"),
-        _ => format!("{file}: cannot be read: {error}"),
-    };
-    let real = |path: PathBuf| path.canonicalize().map_err(unreadable);
-    let path = real(folder.join(path))?;
-    if !path.starts_with(real(folder.to_owned())?) {
-        return Err(format!("{file}: a link that leads out of the folder of the scenario"));
+    let path = inside(folder, file)?;
+    if !path.exists() {
+        return Err(format!("{file}: no such file beside the scenario"));
     }
     if !path.is_file() {
         return Err(format!("{file}: no file to be read from its beginning to its end"));
@@ -169,6 +157,7 @@ fn read_inside(folder: &Path, file: &str) -> Result<String, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::path::PathBuf;
 
     fn folder(name: &str) -> PathBuf {
         let folder = std::env::temp_dir().join(format!("tropism-outline-{}-{name}", std::process::id()));

@@ -226,9 +226,12 @@ impl<'a> Search<'a> {
         let places = |sequence: &Sequence| 0..sequence.errors.len();
         let all = places(steps).flat_map(|i| places(meshes).map(move |j| (i, j)));
         let mut pairs: Vec<_> = all.filter(|&(i, j)| both(i, j) <= TRIED * self.asked).collect();
-        if steps.finest() + meshes.finest() > 0 && !pairs.is_empty() {
+        let tail = steps.tail.hypot(meshes.tail).hypot(by_matrix);
+        // A judge that errs by more than was asked finds none good.
+        let can_judge = steps.finest() + meshes.finest() > 0 && tail <= taken * self.asked;
+        if can_judge && !pairs.is_empty() {
             self.put(steps, steps.finest(), meshes, meshes.finest());
-            let judge = Judge { finest: self.pilot()?, tail: steps.tail.hypot(meshes.tail).hypot(by_matrix) };
+            let judge = Judge { finest: self.pilot()?, tail };
             let time = |&(i, j): &(usize, usize)| steps.costs[i].on(&meshes.costs[j].rates, whole.cone / whole.share);
             pairs.sort_by(|a, b| time(a).total_cmp(&time(b)));
             let mut left = TRIALS * time(&(steps.finest(), meshes.finest()));

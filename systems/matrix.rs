@@ -20,7 +20,7 @@ use crate::numerics::hyperelasticity::{Body, Prescribed};
 use crate::numerics::load_path::{LoadPath, LoadPathOptions};
 use crate::numerics::material::MaterialError;
 use crate::numerics::simplex_mesh::SimplexMesh;
-use crate::numerics::upright::stays_upright;
+use crate::numerics::upright::inverse_stretches;
 use crate::prelude::*;
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -195,8 +195,8 @@ impl Matrix {
                 Equilibria { path: own_mesh::taken_over(&solved.path, &own, tissue)?, ..solved }
             }
         };
-        let upright = stays_upright(&tissue.mesh, solved.path.path());
-        Ok(Equilibria { upright, ..solved })
+        let inverse_stretches = inverse_stretches(&tissue.mesh, solved.path.path());
+        Ok(Equilibria { inverse_stretches, ..solved })
     }
 
     fn solve_on(&self, tissue: &Tissue, law: Arc<dyn Material<2>>) -> Result<Equilibria, InstallError> {
@@ -216,7 +216,7 @@ impl Matrix {
         let largest = self.load.largest();
         path.displacement(largest, &mut farthest);
         let used = 1.0 - ellipticity_left(&body, largest, &farthest);
-        Ok(Equilibria { path, used, unknowns: body.unknowns(), upright: false })
+        Ok(Equilibria { path, used, unknowns: body.unknowns(), inverse_stretches: None })
     }
 }
 
@@ -257,8 +257,7 @@ impl Mechanism for Matrix {
         let tissue = model.world.resource::<Tissue>();
         let inputs = format!("{} {self:?}", tissue.inputs);
         let (equilibria, new) = model.world.resource::<Shelf>().take(&inputs, || self.solve(tissue, law))?;
-        let Equilibria { path, used, unknowns, upright } = &*equilibria;
-        let upright = *upright;
+        let Equilibria { path, used, unknowns, inverse_stretches } = &*equilibria;
         let duration = model.world.resource::<Clock>().grid.hours(model.world.resource::<Clock>().end);
         record(model.world, path, new);
         tell_kinks(model.world, &self.load);
@@ -283,11 +282,13 @@ impl Mechanism for Matrix {
         plan.hold("matrix", held, Each::Run);
         plan.work("matrix", Work::NewtonUnknown, iterations, Each::Run);
         let curve = self.load.clone();
+        let upright = inverse_stretches.is_some();
         model.insert(Loading { equilibria, inputs, curve, duration }).insert_law(self);
         if upright {
             model.upright_motion(follow_load);
         } else {
             model.motion(follow_load);
+            model.world.resource_mut::<Configuration>().is_looked_at_everywhere();
         }
         model.at_end(move |world| {
             if !world.resource::<Configuration>().is_looked_at_here_and_there() {
@@ -362,8 +363,8 @@ struct Equilibria {
     used: f64,
     /// Unknowns of a solve.
     unknowns: usize,
-    /// Whether no cell is ever turned over, for certain.
-    upright: bool,
+    /// Bounds of ‖F⁻¹‖₂ for each part of the path, if certainly no cell is ever turned over.
+    inverse_stretches: Option<Vec<f64>>,
 }
 
 /// The solved load path, and the load over time.
@@ -379,6 +380,11 @@ impl Loading {
     /// The path of equilibria over the load.
     pub fn path(&self) -> &LoadPath {
         &self.equilibria.path
+    }
+
+    /// Whether it is known how far the tissue is pressed together in each part of the path.
+    pub fn is_bounded(&self) -> bool {
+        self.equilibria.inverse_stretches.is_some()
     }
 
     /// Tissue and matrix that decide the path, as text.
@@ -432,5 +438,6 @@ fn follow_load(
     if configuration.revision > 0 && configuration.load == load && configuration.load_rate == rate {
         return;
     }
-    configuration.follow(&tissue.mesh, loading.path().path(), (load, rate));
+    let Equilibria { path, inverse_stretches, .. } = &*loading.equilibria;
+    configuration.follow(&tissue.mesh, (path.path(), inverse_stretches.as_deref()), (load, rate));
 }

@@ -17,6 +17,7 @@ mod squares;
 
 pub use asking::Asking;
 
+use super::matrix::Loading;
 use crate::model::births::Origin;
 use crate::model::shafts::{BLOCK, Struck};
 use crate::numerics::locate::MaterialPoint;
@@ -39,6 +40,8 @@ const PART: &str = "shaft index";
 const SIDE: f64 = 3.0;
 /// Room for ‖F⁻¹‖ to grow before lists are made anew.
 const ROOM: f64 = 1.05;
+/// Vertices of the tissue that are asked for about a cone: those of the cells that some hundred vertices of shafts lie in. Ours.
+const ABOUT_A_CONE: usize = 256;
 /// Cones that are served together: few enough for what they look at to stay in the processor's caches, many enough that little is
 /// looked at by two batches.
 const BATCH: usize = 4096;
@@ -105,8 +108,7 @@ impl ShaftIndex {
             None => {
                 tell(model, reach, search);
                 model.world.resource_mut::<Shafts>().watch();
-                // How far a reach is at rest depends on every cell.
-                model.world.resource_mut::<Configuration>().is_looked_at_everywhere();
+                model.world.resource_mut::<Configuration>().looks_at_more(ABOUT_A_CONE);
                 model.insert(ShaftIndex { search, reach, ..ShaftIndex::default() });
                 model.phase(Phase::Neighbours, index_new_vertices).rebuild(index_again);
             }
@@ -288,16 +290,13 @@ fn tell(model: &mut ModelBuilder, reach: f64, search: Search) {
         Search::Tree => SLACK * size_of::<RTreeNode<Entry>>() as f64,
     };
     let bytes = entries + BYTES_A_BLOCK as f64 / BLOCK as f64;
-    let looked_at = if model.world.resource::<Configuration>().moves {
-        model.world.resource::<Tissue>().mesh.cell_count() as f64
-    } else {
-        0.0
-    };
+    let is_bounded = model.world.get_resource::<Loading>().is_none_or(Loading::is_bounded);
+    let looked_at = if is_bounded { 0 } else { model.world.resource::<Tissue>().mesh.cell_count() };
     let even = evenly_spread(model.world, reach);
     let mut plan = model.plan();
     plan.hold(PART, bytes, Each::ShaftVertex);
     plan.work(PART, Work::Indexed, 1.0, Each::ShaftVertex);
-    plan.work(PART, Work::DeformedCell, looked_at, Each::Stage);
+    plan.work(PART, Work::DeformedCell, looked_at as f64, Each::Stage);
     plan.work(PART, Work::Neighbourhood, 1.0, Each::ConeStage);
     plan.work(PART, Work::EvenSegment, even, Each::ConeStage);
 }

@@ -19,8 +19,8 @@ use std::sync::Arc;
 const CELLS_AT_A_TIME: u32 = 4096;
 /// Vertices that are moved together.
 const VERTICES_AT_A_TIME: usize = 4096;
-/// Vertices a growth cone from which on those that are asked for are reckoned one by one. Ours: a cone asks for some twenty at a stage.
-const MANY_VERTICES: usize = 16;
+/// Vertices that are asked for about a growth cone at a stage, by what moves and steers it by itself. Ours.
+const ABOUT_A_CONE: usize = 16;
 
 /// The configuration φ(·, t): where the vertices are now, and how fast they move.
 #[derive(Debug, Clone, Resource)]
@@ -39,16 +39,11 @@ pub struct Configuration {
     velocities: Vec<[f64; 2]>,
     /// Where all vertices are on a path, if they are not at hand.
     on_path: Option<OnPath>,
-    look: Look,
-}
-
-/// How much of the tissue is looked at in a stage.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Look {
-    /// What lies about growth cones, by the number of these.
-    AboutCones(usize),
-    /// All of it.
-    Everywhere,
+    /// Bound of ‖F⁻¹‖₂ in the part of the path that this belongs to, where one is known.
+    most_pressed: Option<f64>,
+    /// Growth cones, and vertices that are asked for about each at a stage; as many as there are where all is looked at.
+    cones: usize,
+    about_each: usize,
 }
 
 /// A place on a path of displacements, and the rate at which the tissue goes along it.
@@ -140,31 +135,42 @@ impl Configuration {
             velocities: vec![[0.0; 2]; coordinates.len()],
             coordinates,
             on_path: None,
-            look: Look::Everywhere,
+            most_pressed: None,
+            cones: 1,
+            about_each: usize::MAX,
         }
     }
 
-    /// Says that what is asked for at a stage lies about so many growth cones, unless somebody [looks everywhere](Self::is_looked_at_everywhere).
+    /// Says that what is asked for at a stage lies about so many growth cones, until somebody [looks at more](Self::looks_at_more).
     pub fn is_looked_at_about_cones(&mut self, count: usize) {
-        self.look = Look::AboutCones(count);
+        (self.cones, self.about_each) = (count, ABOUT_A_CONE);
+    }
+
+    /// Says that so many more vertices are asked for about each growth cone.
+    pub fn looks_at_more(&mut self, vertices: usize) {
+        self.about_each = self.about_each.saturating_add(vertices);
     }
 
     /// Says that all of the tissue is looked at in each stage.
     pub fn is_looked_at_everywhere(&mut self) {
-        self.look = Look::Everywhere;
+        (self.cones, self.about_each) = (1, usize::MAX);
     }
 
     /// Whether vertices are so many that those which are asked for are better reckoned one by one.
     pub fn is_looked_at_here_and_there(&self) -> bool {
-        match self.look {
-            Look::AboutCones(count) => MANY_VERTICES.saturating_mul(count) < self.coordinates.len(),
-            Look::Everywhere => false,
-        }
+        self.cones.saturating_mul(self.about_each) < self.coordinates.len()
     }
 
-    /// Moves all vertices to a parameter of a path of displacements (µm, flat), along which the tissue goes at a rate (1/h).
-    pub fn follow(&mut self, mesh: &Arc<SimplexMesh<2>>, path: &Arc<HermitePath>, (load, rate): (f64, f64)) {
+    /// Moves all vertices to a parameter of a path of displacements (µm, flat), along which the tissue goes at a rate (1/h). In each part of the
+    /// path ‖F⁻¹‖₂ is at most the given one, if any are known.
+    pub fn follow(
+        &mut self,
+        mesh: &Arc<SimplexMesh<2>>,
+        (path, inverse_stretches): (&Arc<HermitePath>, Option<&[f64]>),
+        (load, rate): (f64, f64),
+    ) {
         let on_path = OnPath { mesh: Arc::clone(mesh), path: Arc::clone(path), place: path.locate(load), rate };
+        self.most_pressed = inverse_stretches.and_then(|bounds| bounds.get(on_path.place.part()).copied());
         self.on_path = if self.is_looked_at_here_and_there() {
             Some(on_path)
         } else {
@@ -203,6 +209,7 @@ impl Configuration {
             on_path.bring(&mut self.coordinates, &mut self.velocities);
         }
         self.coordinates[vertex] = to;
+        self.most_pressed = None;
     }
 
     /// Position of a material point (µm).
@@ -302,10 +309,14 @@ impl Configuration {
         Vector3::new(v.x, v.y, 0.0)
     }
 
-    /// Upper bound of ‖F⁻¹‖₂ over the tissue: a spatial distance r is at most `r · inverse_stretch()` in the reference.
+    /// Upper bound of ‖F⁻¹‖₂ over the tissue: a spatial distance r is at most `r · inverse_stretch()` in the reference. Where it is known for a
+    /// part of a path it is that.
     pub fn inverse_stretch(&self, mesh: &SimplexMesh<2>) -> f64 {
         if !self.moves {
             return 1.0;
+        }
+        if let Some(bound) = self.most_pressed {
+            return bound;
         }
         let square_in_cell = |cell: u32| {
             let f = self.deformation_gradient(mesh, cell);

@@ -206,6 +206,13 @@ impl HermitePath {
     }
 }
 
+impl HermiteWeights {
+    /// The number of the part that the parameter lies in, or that is nearest.
+    pub fn part(&self) -> usize {
+        if self.from == self.to { self.from.saturating_sub(1) } else { self.from }
+    }
+}
+
 /// Weights of the cubic at a share `t` of a part of length `h`.
 fn cubic(t: f64, h: f64) -> [f64; 4] {
     let r = 1.0 - t;

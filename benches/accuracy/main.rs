@@ -2,7 +2,8 @@
 //!
 //! Each scene is settled as a run would settle it. The error that is reached is measured over all axons of the scene
 //! without contact and noise, against a reference of a quarter of the mesh size (at most a 48th of the tissue's smaller
-//! side, no more than 400 000 vertices) and a sixteenth of the step (1024 steps or more). The price is the time of
+//! side, no more than 400 000 vertices) and a sixteenth of the step (1024 steps or more), the matrix on a mesh of its own
+//! of a quarter of its size (no more than 100 000 vertices). The price is the time of
 //! assembly and run at the choice over that of the cheapest of a grid of fixed settings that meets the same accuracy against the same reference: mesh sizes in ratios of √2, four of
 //! them coarser than the choice and two finer, each with steps in ratios of 2 from 32 times the choice's down to a
 //! quarter of it, on meshes with and without grading toward corners where the choice has it. Seconds are CPU time of one thread, median of three; two scenes at a time, each on a thread of its
@@ -35,6 +36,8 @@ const MESHES: std::ops::RangeInclusive<i32> = -2..=4;
 /// Steps of the grid, as powers of 2 of the choice.
 const STEPS: std::ops::RangeInclusive<i32> = -2..=5;
 
+/// The key of the matrix' own mesh.
+const MATRIX_MESH: &str = "/matrix/mesh_size=";
 /// The key of the grading.
 const CORNERS: &str = "/tissue/corner_radius=";
 
@@ -245,10 +248,13 @@ impl Bench<'_> {
         let coarsest = side("width", 0).min(side("height", 1)) / REFERENCE_CELLS;
         let mesh = (chosen.mesh / 4.0).min(coarsest).max(finest);
         let step = (chosen.step / 16.0).min(self.duration / REFERENCE_STEPS);
-        let more: Vec<String> = match scene.get("matrix") {
-            Some(_) => vec![format!("/matrix/tolerance={:e}", 1e-4 * asked), "/matrix/mesh_size=null".to_owned()],
-            None => Vec::new(),
-        };
+        let mut more = Vec::new();
+        if scene.get("matrix").is_some() {
+            let own = self.others.iter().find_map(|key| key.strip_prefix(MATRIX_MESH)?.parse::<f64>().ok());
+            let own = own.map(|own| (own / 4.0).min(coarsest).max(2.0 * finest));
+            more.push(format!("/matrix/tolerance={:e}", 1e-4 * asked));
+            more.push(format!("{MATRIX_MESH}{}", own.map_or("null".to_owned(), |size| format!("{size:e}"))));
+        }
         Ok((self.run(Fixed { mesh, step, graded: true }, &more)?.0, chosen.mesh / mesh))
     }
 

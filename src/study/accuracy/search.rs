@@ -20,7 +20,7 @@ const TRIED: f64 = 4.0;
 const TAKEN: f64 = 1.0;
 const TAKEN_OF_SOME: f64 = 0.9;
 /// By how much a mesh of the matrix' own may move tips, over the accuracy asked for.
-const BY_MATRIX: f64 = 0.2;
+const BY_MATRIX: f64 = 0.1;
 /// What the pairs tried may take together, over one run with the finest of both.
 const TRIALS: f64 = 16.0;
 /// Tolerance of the load path over the accuracy.
@@ -42,7 +42,9 @@ const COARSER_STEPS: i32 = 2;
 const MOST_REFINEMENTS: i32 = 14;
 /// A mesh of more vertices than this is not tried.
 const MOST_VERTICES: f64 = 4e5;
-/// Nor one of the matrix' own of more.
+/// Nothing is refined beyond a pilot that takes this time (ns, as the plan reckons).
+const MOST_TIME: f64 = 1e10;
+/// A mesh of the matrix' own of more vertices than this is not tried.
 const MOST_MATRIX_VERTICES: f64 = 5e4;
 
 /// Vertices to be expected of a mesh of so many µm² with edges of so many µm.
@@ -77,15 +79,17 @@ struct Whole {
     has_corners: bool,
 }
 
-/// A run with the finest of both, and a bound of its own error, which is taken to be independent of that of others.
+/// A run with the finest of both, and bounds of its own error: by step and mesh, taken to be independent of that of others, and by the
+/// mesh of the matrix, which all have in common.
 struct Judge {
     finest: Pilot,
     tail: f64,
+    by_matrix: f64,
 }
 
 impl Judge {
     fn error(&self, pilot: &Pilot) -> f64 {
-        difference(&pilot.tips, &self.finest.tips).hypot(self.tail)
+        difference(&pilot.tips, &self.finest.tips).hypot(self.tail) + self.by_matrix
     }
 }
 
@@ -195,12 +199,13 @@ impl<'a> Search<'a> {
         for place in 0..=MOST_REFINEMENTS {
             let Some(value) = set(self, place) else { break };
             let pilot = self.pilot()?;
+            let is_dear = pilot.time() > MOST_TIME;
             values.push(value);
             pilots.push(pilot);
             let refined = errors(&pilots[first..]);
             let settled =
                 refined.len() >= 3 && refined[refined.len() - 3..refined.len() - 1].iter().all(|error| *error <= goal);
-            if settled {
+            if settled || is_dear {
                 break;
             }
         }
@@ -226,12 +231,12 @@ impl<'a> Search<'a> {
         let places = |sequence: &Sequence| 0..sequence.errors.len();
         let all = places(steps).flat_map(|i| places(meshes).map(move |j| (i, j)));
         let mut pairs: Vec<_> = all.filter(|&(i, j)| both(i, j) <= TRIED * self.asked).collect();
-        let tail = steps.tail.hypot(meshes.tail).hypot(by_matrix);
+        let tail = steps.tail.hypot(meshes.tail);
         // A judge that errs by more than was asked finds none good.
-        let can_judge = steps.finest() + meshes.finest() > 0 && tail <= taken * self.asked;
+        let can_judge = steps.finest() + meshes.finest() > 0 && tail + by_matrix <= taken * self.asked;
         if can_judge && !pairs.is_empty() {
             self.put(steps, steps.finest(), meshes, meshes.finest());
-            let judge = Judge { finest: self.pilot()?, tail };
+            let judge = Judge { finest: self.pilot()?, tail, by_matrix };
             let time = |&(i, j): &(usize, usize)| steps.costs[i].on(&meshes.costs[j].rates, whole.cone / whole.share);
             pairs.sort_by(|a, b| time(a).total_cmp(&time(b)));
             let mut left = TRIALS * time(&(steps.finest(), meshes.finest()));
@@ -249,7 +254,7 @@ impl<'a> Search<'a> {
             }
         }
         self.put(steps, step, meshes, mesh);
-        Ok((step, mesh, both(step, mesh).hypot(by_matrix)))
+        Ok((step, mesh, both(step, mesh) + by_matrix))
     }
 
     /// Puts the coarsest mesh of the matrix' own that moves tips by little, judged on a middling mesh of the tissue; none where the scene has

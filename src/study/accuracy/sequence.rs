@@ -43,6 +43,13 @@ impl Cost {
     }
 }
 
+impl Pilot {
+    /// Time (ns) that it took, as reckoned.
+    pub fn time(&self) -> f64 {
+        self.cost.on(&self.cost.rates, self.cost.rates.cone_stage)
+    }
+}
+
 /// Values refined from place to place.
 pub struct Sequence {
     pub values: Vec<f64>,

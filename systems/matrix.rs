@@ -291,11 +291,13 @@ impl Mechanism for Matrix {
             model.world.resource_mut::<Configuration>().is_looked_at_everywhere();
         }
         model.at_end(move |world| {
-            if !world.resource::<Configuration>().is_looked_at_here_and_there() {
-                // At each stage and at the step's end.
-                let mut plan = world.resource_mut::<Plan>();
-                plan.work("matrix", Work::Moved, moved, Each::Stage);
-                plan.work("matrix", Work::Moved, moved, Each::Step);
+            let few = world.resource::<Configuration>().is_looked_at_here_and_there();
+            let watched = if upright { 0 } else { world.resource::<Tissue>().mesh.cell_count() };
+            let mut plan = world.resource_mut::<Plan>();
+            // At each stage and at the step's end.
+            for each in [Each::Stage, Each::Step] {
+                plan.work("matrix", Work::Moved, if few { 0.0 } else { moved }, each);
+                plan.work("matrix", Work::WatchedCell, watched as f64, each);
             }
             Ok(())
         });

@@ -83,6 +83,8 @@ pub struct ShaftIndex {
     tree: RTree<Entry>,
     search: Search,
     reach: f64,
+    /// The longest segment (µm, reference).
+    longest: f64,
     radius: f64,
     squares: Squares,
     everything: Vec<Listed>,
@@ -107,9 +109,11 @@ impl ShaftIndex {
             }
             None => {
                 tell(model, reach, search);
-                model.world.resource_mut::<Shafts>().watch();
+                let mut shafts = model.world.resource_mut::<Shafts>();
+                shafts.watch();
+                let longest = shafts.longest;
                 model.world.resource_mut::<Configuration>().looks_at_more(ABOUT_A_CONE);
-                model.insert(ShaftIndex { search, reach, ..ShaftIndex::default() });
+                model.insert(ShaftIndex { search, reach, longest, ..ShaftIndex::default() });
                 model.phase(Phase::Neighbours, index_new_vertices).rebuild(index_again);
             }
         }
@@ -150,9 +154,9 @@ impl ShaftIndex {
         found.into_iter().flatten().collect()
     }
 
-    /// Side of a square (µm, reference).
+    /// Side of a square (µm, reference): no shorter than a segment, which would lie in too many.
     fn side(&self) -> f64 {
-        SIDE * self.reach
+        (SIDE * self.reach).max(self.longest)
     }
 
     /// Makes sure that there is a valid list for each square in use.

@@ -113,6 +113,8 @@ pub enum Work {
     Moved,
     /// A cell whose deformation is looked at.
     DeformedCell,
+    /// A cell that is looked at for one that is turned over.
+    WatchedCell,
     /// A gradient sampled and sensed.
     Sampled,
     /// A facet of a border looked at.

@@ -90,11 +90,9 @@ impl Snapshot {
         let (tissue, observables) = (world.resource::<Tissue>(), world.resource::<Observables>());
         let vertices = tissue.mesh.vertex_count();
         let same = |lines: &[(String, Vec<[f64; 2]>)], own: &[(String, Vec<u32>)]| {
-            let alike = |(line, own): (&(String, Vec<[f64; 2]>), &(String, Vec<u32>))| {
-                line.0 == own.0 && line.1.len() == own.1.len()
-            };
+            let extents = lines.iter().map(|(name, line)| (name, line.len()));
             let finite = lines.iter().flat_map(|(_, line)| line).flatten().all(|x| x.is_finite());
-            finite && lines.len() == own.len() && lines.iter().zip(own).all(alike)
+            finite && extents.eq(own.iter().map(|(name, line)| (name, line.len())))
         };
         let is_field = |(view, field): (&FieldView, &Observable)| {
             view.name == field.name && view.concentration.len() == (field.read)(world, field.index).len()

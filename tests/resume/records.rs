@@ -27,6 +27,9 @@ fn recorded(moves: bool) -> (Loaded, [Checkpoint; 2]) {
     (loaded, taken.try_into().unwrap())
 }
 
+/// What spoils records.
+type Spoil<'a> = &'a dyn Fn(&mut Recorder);
+
 fn refusal(checkpoint: &Checkpoint, recorder: &Recorder) -> Option<String> {
     let mut bytes = Vec::new();
     recorder.keep(&mut bytes);
@@ -40,7 +43,7 @@ fn records_that_no_run_can_have_made_are_refused() {
     let own = |checkpoint: &Checkpoint| KeptBytes::new(&checkpoint.recorder).read::<Recorder>().unwrap();
     assert_eq!(refusal(&earlier, &own(&earlier)), None);
     assert!(own(&earlier).snapshots.len() == 1 && own(&later).snapshots.len() == 2, "pictures on the way");
-    let breaks: [(&str, &dyn Fn(&mut Recorder)); 9] = [
+    let breaks: [(&str, Spoil); 9] = [
         ("look at other instants", &|recorder| *recorder = own(&later)),
         ("a film is there that was not asked for, or not there", &|recorder| {
             recorder.given_up = Some("no room".into())

@@ -303,7 +303,7 @@ fn with_output(arguments: &[&str], out: Stdio) -> (i32, String) {
 
 #[test]
 fn a_reader_that_has_gone_is_no_fault_and_a_full_device_is() {
-    for arguments in [&["scene.json"][..], &["schema"], &["mechanisms"]] {
+    for arguments in [&["scene.json"][..], &["schema"], &["mechanisms"], &["man"], &["completions", "bash"]] {
         let (code, words) = with_output(arguments, Stdio::piped());
         assert!(code == 0 && !words.contains("panicked"), "{arguments:?}: {words}");
         let Ok(full) = std::fs::OpenOptions::new().write(true).open("/dev/full") else { continue };

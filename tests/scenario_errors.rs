@@ -371,6 +371,8 @@ fn a_problem_names_the_file_or_the_override_it_comes_from() {
     assert_eq!(scenes.problems("top.json", &["/growth=3", "time/step=1"]), expected);
     assert_eq!(scenes.problems("loop.json", &[]), ["/base: (in pool.json) loop.json is a base of itself"]);
     assert_eq!(scenes.problems("orphan.json", &[]), ["/base: (in orphan.json) gone.json: no such file"]);
+    let set = scenes.problems("top.json", &["/base=\"base.json\""]);
+    assert!(set.iter().any(|problem| problem.starts_with("/base: a base stands in a file")), "{set:?}");
     for (name, base) in [("outside.json", "../base.json"), ("elsewhere.json", "/etc/hostname")] {
         let [problem] = scenes.problems(name, &[]).try_into().unwrap();
         let refused = format!("/base: (in {name}) \"{base}\" is not the name of a file in the folder of the scenario");

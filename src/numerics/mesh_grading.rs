@@ -89,7 +89,7 @@ impl Grading {
         self.count() > before
     }
 
-    /// Asks for shorter edges around a corner with the angle ω > π inside: h = H (r/R)^(1−μ) at the distance r ≤ R, down to h = r,
+    /// Asks for shorter edges around a corner with the angle ω > π inside: h = H (r/R)^(1−μ) at the distance r ≤ R, to within a factor of two, down to h = r,
     /// [`MOST_LEVELS`] at most. R (µm) is `radius`, or the distance to the next corner: behind that lies another field, and places do not
     /// overlap more than a few times however many corners there are.
     pub fn toward_corner(&mut self, corner: &Corner, radius: f64) {
@@ -189,9 +189,9 @@ mod tests {
             let wanted = size * (away / 64.0).min(1.0).powf(power);
             for turn in (0..12).map(|i| 0.5 * f64::from(i)) {
                 let found = grading.size_at([3.0 + away * turn.cos(), 5.0 + away * turn.sin()]);
-                // Down to h = r; squares are as wide as two edges of their own, and ask for those around them.
+                // Sizes go in factors of two, down to h = r; squares are as wide as two edges of their own, and ask for those around them.
                 if away > wanted {
-                    assert!(found <= wanted * 1.001, "{away}: {found} for {wanted}");
+                    assert!(found <= 2.0 * wanted, "{away}: {found} for {wanted}");
                 }
                 let farther = (away - 4.0 * wanted).max(0.0);
                 let least = 0.49 * size * (farther / 64.0).min(1.0).powf(power);

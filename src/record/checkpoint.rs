@@ -140,6 +140,9 @@ impl Checkpoint {
     /// # Errors
     /// A file that cannot be read, or whose content [`Self::from_bytes`] refuses.
     pub fn read(path: &Path) -> Result<Self, CheckpointError> {
+        if !fs::metadata(path)?.is_file() {
+            return Err(io::Error::other("it is no file to be read from its beginning to its end").into());
+        }
         let mut file = File::open(path)?;
         let length = file.metadata()?.len();
         let mut bytes = Vec::new();

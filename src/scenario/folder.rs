@@ -5,7 +5,7 @@ use std::path::{Component, Path, PathBuf};
 /// Where a file lies that a scenario in `folder` names, links followed if it is there.
 ///
 /// # Errors
-/// A name, or a link, that leads out of the folder.
+/// A name, or a link, that leads out of the folder; something that is no file, such as a pipe, which could keep the reader waiting.
 pub fn inside(folder: &Path, file: &str) -> Result<PathBuf, String> {
     let path = Path::new(file);
     let stays = path.components().all(|part| matches!(part, Component::Normal(_) | Component::CurDir));
@@ -19,6 +19,9 @@ pub fn inside(folder: &Path, file: &str) -> Result<PathBuf, String> {
     match (path.canonicalize(), folder.canonicalize()) {
         (Ok(path), Ok(folder)) if !path.starts_with(&folder) => {
             Err(format!("{file}: a link that leads out of the folder of the scenario"))
+        }
+        (Ok(path), _) if !path.is_file() && !path.is_dir() => {
+            Err(format!("{file}: no file to be read from its beginning to its end"))
         }
         _ => Ok(path),
     }

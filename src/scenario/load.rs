@@ -222,6 +222,10 @@ impl Draft {
         overrides::remove_blocks(&mut self.document, &request.without, &names, &mut self.problems, &mut self.hints);
         for text in &request.set {
             match overrides::set(&mut self.document, text) {
+                Ok(pointer) if pointer == "/base" => {
+                    let message = "a base stands in a file: what is set comes on top of all files";
+                    self.problems.push(Violation::new(pointer, message));
+                }
                 Ok(pointer) => self.overridden.push(pointer),
                 Err(problem) => self.problems.push(problem),
             }

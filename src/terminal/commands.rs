@@ -3,7 +3,7 @@
 use super::arguments::{Cli, SceneArguments};
 use super::interrupt::Interrupt;
 use super::manners::{alarming, progress_bar};
-use super::voice::{alarm, note, say, tell};
+use super::voice::{alarm, bytes_out, note, say, tell};
 use crate::model::mechanism::Roster;
 use crate::new_mechanism::{NewMechanism, NewMechanismError};
 use crate::record::checkpoint;
@@ -68,8 +68,7 @@ pub fn print_json(value: &impl Serialize) -> Result<ExitCode, RunError> {
 }
 
 pub fn print_bytes(bytes: &[u8]) -> Result<ExitCode, RunError> {
-    // As for `say`.
-    let _ = std::io::stdout().write_all(bytes);
+    bytes_out(bytes);
     Ok(ExitCode::SUCCESS)
 }
 

@@ -13,7 +13,17 @@ static UNSAID: Mutex<Option<String>> = Mutex::new(None);
 /// Writes a line on standard output.
 pub fn line_out(line: Arguments) {
     let mut out = stdout().lock();
-    let written = writeln!(out, "{line}").and_then(|()| out.flush());
+    keep_reason(writeln!(out, "{line}").and_then(|()| out.flush()));
+}
+
+/// Writes bytes on standard output.
+pub fn bytes_out(bytes: &[u8]) {
+    let mut out = stdout().lock();
+    keep_reason(out.write_all(bytes).and_then(|()| out.flush()));
+}
+
+/// Keeps the first reason why something could not be written.
+fn keep_reason(written: std::io::Result<()>) {
     if let Err(error) = written.map_err(|error| (error.kind(), error.to_string()))
         && error.0 != ErrorKind::BrokenPipe
         && let Ok(mut unsaid) = UNSAID.lock()

@@ -226,11 +226,11 @@ mod tests {
             name(squares.make(3), vertex, parts);
         }
         let listed = |block, vertices, parts| Listed { block, vertices, parts };
-        let (first, last) = (listed(0, 0b101, 2), listed(56, 0b10000, 8));
-        assert_eq!(squares.get(3), Some(&[first, listed(2, 0b1010, 5), last][..]));
+        let (first, last) = (listed(0, 0b101, 2), listed(112, 0b10000, 8));
+        assert_eq!(squares.get(3), Some(&[first, listed(4, 0b1010, 5), last][..]));
         unname(squares.make(3), 900);
         unname(squares.make(3), 35);
-        assert_eq!(squares.get(3), Some(&[first, listed(2, 0b10, 5)][..]));
+        assert_eq!(squares.get(3), Some(&[first, listed(4, 0b10, 5)][..]));
     }
 
     #[test]

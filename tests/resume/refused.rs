@@ -148,6 +148,14 @@ fn a_checkpoint_that_is_cut_or_damaged_is_refused_and_the_one_before_is_used() {
         assert!(found == expected && time == earlier.time, "{reason}");
         assert!(refused.len() == 1 && refused[0].contains(reason), "{refused:?}");
     }
+    // A pipe would keep the reader waiting.
+    #[cfg(unix)]
+    {
+        std::fs::remove_file(&newest).unwrap();
+        assert!(Command::new("mkfifo").arg(&newest).status().unwrap().success());
+        let (_, refused, time) = picked_up(&folder);
+        assert!(time == earlier.time && refused[0].contains("it is no file to be read"), "{refused:?}");
+    }
     // Killed between the two renames: only the one before has its name.
     std::fs::remove_file(&newest).unwrap();
     assert_eq!(picked_up(&folder).2, earlier.time);

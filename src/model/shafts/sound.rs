@@ -73,7 +73,7 @@ mod tests {
         let breaks: [fn(&mut Shafts); 12] = [
             |shafts| shafts.longest = 0.0,
             |shafts| shafts.chains.truncate(1),
-            |shafts| _ = shafts.blocks.get_mut(2).push(Site { cell: 1, ..Site::default() }, 0.0),
+            |shafts| _ = shafts.blocks.get_mut(4).push(Site { cell: 1, ..Site::default() }, 0.0),
             |shafts| shafts.blocks = Blocks::new(2),
             |shafts| shafts.blocks.get_mut(0).used = 17,
             |shafts| shafts.blocks.get_mut(0).used = 0,

@@ -23,7 +23,6 @@ use crate::study::run::{RunError, block_schemas, folder_of, write_figure, write_
 use crate::study::seeds::{SeedsSummary, over_seeds_until, summarise};
 use crate::study::stability::Stability;
 use serde::Serialize;
-use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 

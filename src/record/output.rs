@@ -49,8 +49,18 @@ pub fn write_and_keep_previous(path: &Path, previous: &Path, contents: &[u8]) ->
 /// As [`write_atomically`].
 pub fn write_unsynced(path: &Path, contents: &[u8]) -> Result<(), WriteError> {
     let temporary = temporary_beside(path);
-    let written = fs::write(&temporary, contents).and_then(|()| fs::rename(&temporary, path));
+    let written = begun_anew(&temporary).and_then(|mut file| file.write_all(contents));
+    let written = written.and_then(|()| fs::rename(&temporary, path));
     written.map_err(|source| WriteError { path: path.to_owned(), source })
+}
+
+/// A fresh file under a temporary name. What a run that was killed, or a link that somebody laid, left there goes: it is not written through.
+fn begun_anew(temporary: &Path) -> io::Result<File> {
+    match fs::remove_file(temporary) {
+        Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(error),
+        _ => {}
+    }
+    File::create_new(temporary)
 }
 
 /// A file that grows under a temporary name beside its own, and takes that only when it is complete.
@@ -68,7 +78,7 @@ impl Partial {
     /// The path and the system's reason.
     pub fn create(path: &Path) -> Result<Self, WriteError> {
         let temporary = temporary_beside(path);
-        let file = make_parent(path).and_then(|()| File::create(&temporary));
+        let file = make_parent(path).and_then(|()| begun_anew(&temporary));
         let file = file.map_err(|source| WriteError { path: path.to_owned(), source })?;
         Ok(Self { path: path.to_owned(), temporary, file: Some(file) })
     }
@@ -162,7 +172,7 @@ fn make_parent(path: &Path) -> io::Result<()> {
 /// The first step of an atomic write: all of a file, on disk.
 fn write_whole(temporary: &Path, contents: &[u8]) -> io::Result<()> {
     make_parent(temporary)?;
-    let mut file = File::create(temporary)?;
+    let mut file = begun_anew(temporary)?;
     file.write_all(contents)?;
     file.sync_all()
 }
@@ -189,6 +199,27 @@ mod tests {
         let folder = std::env::temp_dir().join(format!("tropism-output-{}-{name}", std::process::id()));
         let _ = fs::remove_dir_all(&folder);
         folder
+    }
+
+    #[test]
+    #[cfg(unix)]
+    fn a_link_in_the_place_of_a_temporary_file_is_not_written_through() {
+        let folder = std::env::temp_dir().join(format!("tropism-link-{}", std::process::id()));
+        fs::create_dir_all(&folder).unwrap();
+        let (kept, path) = (folder.join("kept"), folder.join("summary.json"));
+        fs::write(&kept, "keep me").unwrap();
+        let lay = || std::os::unix::fs::symlink(&kept, temporary_beside(&path)).unwrap();
+        lay();
+        write_atomically(&path, b"{}").unwrap();
+        lay();
+        write_unsynced(&path, b"{}").unwrap();
+        lay();
+        let mut partial = Partial::create(&path).unwrap();
+        partial.write(b"{}").unwrap();
+        partial.commit().unwrap();
+        assert_eq!(fs::read_to_string(&kept).unwrap(), "keep me");
+        assert!(!path.is_symlink() && fs::read_to_string(&path).unwrap() == "{}");
+        fs::remove_dir_all(folder).unwrap();
     }
 
     #[test]

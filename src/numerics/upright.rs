@@ -17,10 +17,13 @@
 
 use crate::numerics::hermite::HermitePath;
 use crate::numerics::simplex_mesh::{SimplexMesh, determinant};
+use crate::numerics::vector::between;
 use rayon::prelude::*;
 
 /// Share of a cell's area at rest that is left for round-off.
 const MARGIN: f64 = 1e-9;
+/// What round-off may add where vertices are reckoned from the path.
+const ROUND_OFF: f64 = 1.0 + 1e-10;
 /// Cells that are looked at together.
 const CELLS_AT_A_TIME: usize = 1024;
 
@@ -46,7 +49,7 @@ fn inverse_stretch(mesh: &SimplexMesh<2>, path: &HermitePath, (cell, part): (usi
         [0, 1, 2, 3].map(|i| [x + u[i], y + v[i]])
     };
     let [origin, first, second] = [0, 1, 2].map(|i| controls(corners[i]));
-    let edges = [0, 1, 2, 3].map(|i| [between(origin[i], first[i]), between(origin[i], second[i])]);
+    let edges = [0, 1, 2, 3].map(|i| [between(&origin[i], &first[i]), between(&origin[i], &second[i])]);
     let mut area = [0.0; 7];
     for i in 0..4 {
         for j in 0..4 {
@@ -59,7 +62,7 @@ fn inverse_stretch(mesh: &SimplexMesh<2>, path: &HermitePath, (cell, part): (usi
     // Not what is no number either.
     let upright = least > MARGIN * at_rest && area.iter().all(|d| d.is_finite());
     let largest = edges.iter().map(|edges| stretch(&rest, edges)).fold(0.0, f64::max);
-    upright.then(|| largest * at_rest / least)
+    upright.then(|| largest * at_rest / least * ROUND_OFF)
 }
 
 /// ‖F‖₂ of the map that takes the edges of a cell at rest to others.
@@ -71,10 +74,6 @@ fn stretch(rest: &[[f64; 2]; 2], edges: &[[f64; 2]; 2]) -> f64 {
     let half = 0.5 * f.as_flattened().iter().map(|x| x * x).sum::<f64>();
     let det = f[0][0] * f[1][1] - f[0][1] * f[1][0];
     (half + (half * half - det * det).max(0.0).sqrt()).sqrt()
-}
-
-fn between(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
-    [b[0] - a[0], b[1] - a[1]]
 }
 
 #[cfg(test)]

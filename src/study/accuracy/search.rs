@@ -1,7 +1,8 @@
 //! The search for the cheapest step and mesh sizes.
 
+use super::pairs::{Judge, Pair};
 use super::sequence::{Cost, Pilot, Sequence, errors};
-use super::{Found, difference, given};
+use super::{Found, given};
 use crate::model::configuration::Configuration;
 use crate::model::plan::Plan;
 use crate::model::tissue::Tissue;
@@ -14,9 +15,7 @@ use crate::study::run::RunError;
 
 /// What one part of the error may come to where its sequence ends, over the accuracy asked for.
 const SHARE: f64 = 0.4;
-/// What both parts may come to for a pair to be tried, and what one run may then show: less where pilots have not all
-/// axons.
-const TRIED: f64 = 4.0;
+/// What one run with a pair may show for it to be taken: less where pilots have not all axons.
 const TAKEN: f64 = 1.0;
 const TAKEN_OF_SOME: f64 = 0.9;
 /// By how much a mesh of the matrix' own may move tips, over the accuracy asked for.
@@ -77,20 +76,6 @@ struct Whole {
     share: f64,
     /// Whether the tissue has re-entrant corners.
     has_corners: bool,
-}
-
-/// A run with the finest of both, and bounds of its own error: by step and mesh, taken to be independent of that of others, and by the
-/// mesh of the matrix, which all have in common.
-struct Judge {
-    finest: Pilot,
-    tail: f64,
-    by_matrix: f64,
-}
-
-impl Judge {
-    fn error(&self, pilot: &Pilot) -> f64 {
-        difference(&pilot.tips, &self.finest.tips).hypot(self.tail) + self.by_matrix
-    }
 }
 
 impl<'a> Search<'a> {
@@ -212,9 +197,9 @@ impl<'a> Search<'a> {
         Ok(Sequence::of(values, &pilots, goal))
     }
 
-    fn put(&mut self, steps: &Sequence, step: usize, meshes: &Sequence, mesh: usize) {
-        self.step = steps.values[step];
-        self.mesh = self.mesh.map(|_| meshes.values[mesh]);
+    fn put(&mut self, (step, mesh): (f64, f64)) {
+        self.step = step;
+        self.mesh = self.mesh.map(|_| mesh);
     }
 
     /// Puts the cheapest pair that meets the accuracy by one run with the finest of both, or, if there is none, the pair
@@ -226,35 +211,30 @@ impl<'a> Search<'a> {
         (whole, by_matrix): (&Whole, f64),
     ) -> Result<(usize, usize, f64), RunError> {
         let taken = if whole.share < 1.0 { TAKEN_OF_SOME } else { TAKEN };
-        let both = |i: usize, j: usize| steps.errors[i].hypot(meshes.errors[j]);
-        let (step, mesh) = (steps.settled, meshes.settled);
-        let places = |sequence: &Sequence| 0..sequence.errors.len();
-        let all = places(steps).flat_map(|i| places(meshes).map(move |j| (i, j)));
-        let mut pairs: Vec<_> = all.filter(|&(i, j)| both(i, j) <= TRIED * self.asked).collect();
+        let settled = (steps.settled, meshes.settled);
         let tail = steps.tail.hypot(meshes.tail);
         // A judge that errs by more than was asked finds none good.
-        let can_judge = steps.finest() + meshes.finest() > 0 && tail + by_matrix <= taken * self.asked;
-        if can_judge && !pairs.is_empty() {
-            self.put(steps, steps.finest(), meshes, meshes.finest());
+        if steps.finest() + meshes.finest() > 0 && tail + by_matrix <= taken * self.asked {
+            self.put((steps.values[steps.finest()], meshes.values[meshes.finest()]));
             let judge = Judge { finest: self.pilot()?, tail, by_matrix };
-            let time = |&(i, j): &(usize, usize)| steps.costs[i].on(&meshes.costs[j].rates, whole.cone / whole.share);
-            pairs.sort_by(|a, b| time(a).total_cmp(&time(b)));
-            let mut left = TRIALS * time(&(steps.finest(), meshes.finest()));
-            for (step, mesh) in pairs {
-                left -= time(&(step, mesh));
+            let pairs = Pair::all(steps, meshes, whole.cone / whole.share);
+            let mut left = TRIALS * pairs.iter().map(|pair| pair.time).fold(0.0, f64::max);
+            for Pair { values, places, time } in pairs {
+                left -= time;
                 if left < 0.0 {
                     break;
                 }
-                self.put(steps, step, meshes, mesh);
+                self.put(values);
                 // A mesh on which there is no equilibrium is none to take.
                 let error = self.pilot().map_or(f64::INFINITY, |pilot| judge.error(&pilot));
                 if error <= taken * self.asked {
-                    return Ok((step, mesh, error));
+                    return Ok((places.0, places.1, error));
                 }
             }
         }
-        self.put(steps, step, meshes, mesh);
-        Ok((step, mesh, both(step, mesh) + by_matrix))
+        let (step, mesh) = settled;
+        self.put((steps.values[step], meshes.values[mesh]));
+        Ok((step, mesh, steps.errors[step].hypot(meshes.errors[mesh]) + by_matrix))
     }
 
     /// Puts the coarsest mesh of the matrix' own that moves tips by little, judged on a middling mesh of the tissue; none where the scene has

@@ -78,6 +78,11 @@ impl Sequence {
         Self { values, errors, costs, settled, tail }
     }
 
+    /// Places and values whose error is known by a finer one, or that the scene gives.
+    pub fn judged(&self) -> impl Iterator<Item = (usize, f64)> + '_ {
+        self.values.iter().copied().take(self.errors.len()).enumerate()
+    }
+
     /// The last place.
     pub fn finest(&self) -> usize {
         self.values.len() - 1

@@ -117,6 +117,7 @@ impl Mechanism for ConeRelease {
         }
         model.pulls_up_to(1.0);
         model.plan().work(Self::NAME, Work::Neighbourhood, self.cues.len() as f64, Each::ConeStage);
+        model.acts_between_cones();
         model.insert_law(self).term(Term::Sample, steer).at_end(bind);
         Ok(())
     }

@@ -1,58 +1,74 @@
-//! Steps that a tolerance chooses, for an embedded pair of explicit methods.
+//! Steps of each cone's own size, which a tolerance chooses, for an embedded pair of explicit methods.
 //!
 //! A pair of orders p and p − 1 gives two results for the price of one. Where they differ by δx in place (µm, as deformed at
-//! the step's end) and by δu in the velocity vector over v_g, the error of the step is taken to be, in µm,
+//! the step's end) and by δu in the velocity vector over v_g, the error of a cone's step is taken to be, in µm,
 //!
 //! ```text
-//! max over growing cones of  |δx| + v_g min(1/κ, T) |δu|
+//! |δx| + v_g min(1/κ, T) |δu|
 //! ```
 //!
 //! A heading that is off by |δu| leads the tip astray until a full pull has turned it back, which takes 1/κ: the weight is the
-//! turning radius v_g/κ, or the length of way v_g T of the whole run T where that is less. A step is accepted if its error is
+//! turning radius v_g/κ, or the length of way v_g T of the whole run T where that is less. A cone's step is accepted if its error is
 //! within the tolerance, and the result of order p is kept. Both results start from the heading after the first kick of the noise
 //! and are compared before the second, so the kicks are no error.
 //!
-//! Steps are powers of two of the clock's tick and end at multiples of themselves, so that refined steps meet the same
-//! instants and the same Brownian path. What decides the next step is kept in the [`Clock`] and nowhere else.
+//! The clock's step Δt is the largest. A cone takes it whole or in parts of Δt/2, Δt/4, …, which end at multiples of themselves, so
+//! that they meet the same instants and the same Brownian path. Those of one size step together while the others wait
+//! ([`Status::Waiting`]); at multiples of Δt all meet. Shafts are those of the step's start for all of them. Where a
+//! mechanism lets cones act on one another within a step, all take the steps of the one that needs the shortest.
 
-use super::births::{lay_origins, send_back};
 use super::clock::{Clock, Kinks};
-use super::components::Status;
+use super::components::{GrowthCone, Status};
 use super::explicit::{difference, finish, run_stages, start_again};
 use super::health::{Counters, Health};
 use super::integrator::bring_tissue_to;
-use super::movers::{ConeQuery, StepStart, each_growing};
+use super::movers::{ConeQuery, Stages, StepStart, each_growing};
 use crate::kept;
 use crate::numerics::runge_kutta::ButcherTableau;
+use bevy_ecs::change_detection::DetectChangesMut;
 use bevy_ecs::prelude::{Resource, World};
 
 /// A longer step is tried if its error is expected to stay within this share of the tolerance.
 const SAFETY: f64 = 0.8;
 
 /// What chooses the steps; absent with a method of fixed steps.
-#[derive(Debug, Clone, Copy, PartialEq, Resource)]
+#[derive(Debug, Clone, PartialEq, Resource)]
 pub struct AdaptiveSteps {
-    /// Largest error of a step (µm).
+    /// Largest error of a cone's step (µm).
     pub tolerance: f64,
     /// Duration T of the run (h).
     pub duration: f64,
+    /// Whether all cones take steps of one size.
+    pub together: bool,
+    /// Halvings of the clock's step that each cone takes next, in the order of cones; none before the first step.
+    pub levels: Vec<u8>,
     /// Steps of one tick that were accepted with a larger error.
     pub missed: u64,
     /// The largest error of these (µm).
     pub worst: f64,
 }
 
-kept! { struct AdaptiveSteps { tolerance, duration, missed, worst } }
+kept! { struct AdaptiveSteps { tolerance, duration, together, levels, missed, worst } }
 
 impl AdaptiveSteps {
     /// Steps to a tolerance (µm) in a run that lasts `duration` (h).
     pub fn new(tolerance: f64, duration: f64) -> Self {
-        Self { tolerance, duration, missed: 0, worst: 0.0 }
+        Self { tolerance, duration, together: false, levels: Vec::new(), missed: 0, worst: 0.0 }
     }
 
-    fn note_miss(&mut self, error: f64, health: &mut Health) {
-        self.missed += 1;
-        self.worst = self.worst.max(error);
+    /// Whether steps that nothing was taken of may become `later`, on a clock whose step has so many ticks, with so many cones.
+    pub(super) fn may_become(&self, later: &Self, step: u64, cones: usize) -> bool {
+        let given = |steps: &Self| (steps.tolerance, steps.duration, steps.together);
+        let fits = later.levels.is_empty() || later.levels.len() == cones;
+        given(self) == given(later) && fits && later.levels.iter().all(|level| u64::from(*level) <= step.ilog2().into())
+    }
+
+    fn note_misses(&mut self, missed: &[f64], health: &mut Health) {
+        if missed.is_empty() {
+            return;
+        }
+        self.missed += missed.len() as u64;
+        self.worst = missed.iter().copied().fold(self.worst, f64::max);
         let Self { tolerance, missed, worst, .. } = self;
         health.restate(
             "time: the tolerance was missed ",
@@ -63,88 +79,211 @@ impl AdaptiveSteps {
     }
 }
 
-/// An accepted step.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Taken {
-    /// Its end (ticks).
-    pub to: u64,
-    /// How many cones that were to be born in the first attempt are born later.
-    pub sent_back: u64,
-}
-
-/// Runs one step of the clock's size, or of the half, the quarter, … of it until the error is within the tolerance.
+/// Runs one step of the clock over a span of ticks. Returns how many steps cones took in it.
 pub(super) fn adaptive_step(
-    world: &mut World,
-    cones: &mut ConeQuery,
-    starts: &mut [StepStart],
-    pair: &ButcherTableau,
-) -> Taken {
-    let clock = *world.resource::<Clock>();
-    let (from, mut sent_back) = (clock.now, 0);
-    let mut to = from + clock.next_step();
-    run_stages(world, cones, starts, (from, to), (pair, 0..1));
-    let error = loop {
-        run_stages(world, cones, starts, (from, to), (pair, 1..pair.stages()));
-        let error = largest_error(world, cones, starts, (from, to), pair);
-        if is_accepted(world, error, to - from) {
-            break error;
-        }
-        world.resource_mut::<Counters>().rejected_steps += 1;
-        let mut clock = world.resource_mut::<Clock>();
-        clock.step = shorter(to - from);
-        to = from + clock.next_step();
-        let begin = clock.grid.hours(from);
-        sent_back += send_back(world, cones, starts, to);
-        bring_tissue_to(world, begin);
-        each_growing(world, cones, starts, (from, to), start_again);
-    };
-    lay_origins(world, from);
-    each_growing(world, cones, starts, (from, to), |step, mover| finish(step, mover, pair));
-    pace(world, (from, to), error, pair.order);
-    Taken { to, sent_back }
-}
-
-/// Lets the clock run on to an instant (ticks) at which nothing has happened.
-pub fn idle_until(world: &mut World, to: u64) {
-    let from = world.resource::<Clock>().now;
-    if world.contains_resource::<AdaptiveSteps>() {
-        pace(world, (from, to), 0.0, 1);
-    }
-    world.resource_mut::<Clock>().now = to;
-}
-
-/// Estimated error of a step (µm), the largest over the growing cones; NaN if one of them is.
-fn largest_error(
     world: &mut World,
     cones: &mut ConeQuery,
     starts: &mut [StepStart],
     span: (u64, u64),
     pair: &ButcherTableau,
-) -> f64 {
-    let Some(duration) = world.get_resource::<AdaptiveSteps>().map(|steps| steps.duration) else { return 0.0 };
-    each_growing(world, cones, starts, span, |step, mover| {
-        let (place, vector) = difference(step, mover, pair);
-        let radius = mover.cone.speed * duration.min(1.0 / step.growth.turning_rate);
-        mover.start.stages().error = place.norm() + radius * vector.norm();
+) -> u64 {
+    let whole = world.resource::<Clock>().grid.step_ticks();
+    let Some(mut steps) = world.get_resource_mut::<AdaptiveSteps>() else { return 0 };
+    let (tolerance, duration, together) = (steps.tolerance, steps.duration, steps.together);
+    let mut levels = std::mem::take(&mut steps.levels);
+    levels.resize(starts.len(), 0);
+    for (start, level) in starts.iter_mut().zip(&levels) {
+        let stages = start.stages();
+        (stages.level, stages.reached) = (*level, span.0);
+    }
+    let rule = Rule { whole, tolerance, order: pair.order };
+    let mut cover = Cover { cones, starts, pair, rule, duration, together, taken: 0, missed: Vec::new() };
+    cover.cover(world, span, true);
+    let Cover { taken, missed, .. } = cover;
+    for mut cone in cones.iter_mut(world).filter(|cone| *cone.1 == Status::Waiting) {
+        cone.1.set_if_neq(Status::Growing);
+    }
+    for (level, start) in levels.iter_mut().zip(starts) {
+        *level = start.stages().level;
+    }
+    world.resource_scope::<Health, _>(|world, mut health| {
+        let mut steps = world.resource_mut::<AdaptiveSteps>();
+        steps.levels = levels;
+        steps.note_misses(&missed, &mut health);
     });
-    let growing = cones.iter(world).zip(starts).filter(|(cone, _)| *cone.1 == Status::Growing);
-    growing
-        .map(|(_, start)| start.stages().error)
-        .fold(0.0, |worst: f64, error| if worst.is_nan() || error <= worst { worst } else { error })
+    taken
 }
 
-/// Whether a step of so many ticks stands. An error that is no number stands too: the state it belongs to ends the run.
-fn is_accepted(world: &mut World, error: f64, ticks: u64) -> bool {
-    world.resource_scope::<Health, _>(|world, mut health| {
-        let Some(mut steps) = world.get_resource_mut::<AdaptiveSteps>() else { return true };
-        if error > steps.tolerance && error.is_finite() {
-            if ticks > 1 {
-                return false;
+/// Brings the clock to an instant (ticks) at which a step ends.
+pub fn reach(world: &mut World, to: u64) {
+    let stop = match world.contains_resource::<AdaptiveSteps>() {
+        true => world.get_resource::<Kinks>().map_or(u64::MAX, |kinks| kinks.after(to)),
+        false => u64::MAX,
+    };
+    let mut clock = world.resource_mut::<Clock>();
+    (clock.now, clock.stop) = (to, stop);
+}
+
+/// The cones in a step that is covered by parts.
+struct Cover<'a> {
+    cones: &'a mut ConeQuery,
+    starts: &'a mut [StepStart],
+    pair: &'a ButcherTableau,
+    rule: Rule,
+    /// Duration of the run (h).
+    duration: f64,
+    together: bool,
+    /// Steps of cones taken so far.
+    taken: u64,
+    /// Errors of steps of one tick beyond the tolerance (µm).
+    missed: Vec<f64>,
+}
+
+impl Cover<'_> {
+    /// Brings all cones from the start of a span of ticks to its end: those whose steps are as long in one, the others in two parts.
+    /// `is_fresh` tells that their first stage has not been evaluated yet.
+    fn cover(&mut self, world: &mut World, span: (u64, u64), is_fresh: bool) {
+        let (from, to) = span;
+        let is_due = |cone: &GrowthCone, stages: &Stages| cone.birth.max(stages.reached) < to;
+        if is_fresh {
+            if self.call_up(world, is_due) == 0 {
+                return;
             }
-            steps.note_miss(error, &mut health);
+            run_stages(world, self.cones, self.starts, span, (self.pair, 0..1));
         }
-        true
-    })
+        let deepest = if self.together { self.deepest(world, is_due) } else { 0 };
+        let whole = self.rule.whole;
+        let takes_whole = |stages: &Stages| whole >> stages.level.max(deepest) >= to - from;
+        let trying = self.call_up(world, |cone, stages| is_due(cone, stages) && takes_whole(stages));
+        if trying > 0 {
+            if !is_fresh {
+                let begin = world.resource::<Clock>().grid.hours(from);
+                bring_tissue_to(world, begin);
+                each_growing(world, self.cones, self.starts, span, start_again);
+            }
+            run_stages(world, self.cones, self.starts, span, (self.pair, 1..self.pair.stages()));
+            self.judge(world, span, deepest);
+            let pair = self.pair;
+            each_growing(world, self.cones, self.starts, span, |step, mover| {
+                finish(step, mover, pair);
+                // A cone that was lost goes no further.
+                mover.start.stages().reached = if mover.start.fault.is_some() { u64::MAX } else { to };
+            });
+        }
+        if self.take_back(world, is_due) > 0 {
+            let half = shorter(to - from);
+            let middle = from + half - from % half;
+            self.cover(world, (from, middle), false);
+            self.cover(world, (middle, to), true);
+        }
+    }
+
+    /// Lets those growing cones act that `wanted` names, and has the others wait. Returns how many act.
+    fn call_up(&mut self, world: &mut World, wanted: impl Fn(&GrowthCone, &Stages) -> bool) -> u64 {
+        let mut count = 0;
+        for ((cone, mut status, ..), start) in self.cones.iter_mut(world).zip(&mut *self.starts) {
+            if matches!(*status, Status::Growing | Status::Waiting) {
+                let acts = wanted(cone, start.stages());
+                count += u64::from(acts);
+                status.set_if_neq(if acts { Status::Growing } else { Status::Waiting });
+            }
+        }
+        count
+    }
+
+    /// Takes those growing cones that `wanted` names back to where their first stage was evaluated. Returns how many.
+    fn take_back(&mut self, world: &mut World, wanted: impl Fn(&GrowthCone, &Stages) -> bool) -> u64 {
+        let mut count = 0;
+        for ((cone, status, mut site, _, _, mut spring, _), start) in self.cones.iter_mut(world).zip(&mut *self.starts)
+        {
+            if matches!(*status, Status::Growing | Status::Waiting) && wanted(cone, start.stages()) {
+                (*site, *spring) = start.taken_back();
+                count += 1;
+            }
+        }
+        count
+    }
+
+    /// The most halvings that one of the growing cones takes that `wanted` names.
+    fn deepest(&mut self, world: &World, wanted: impl Fn(&GrowthCone, &Stages) -> bool) -> u8 {
+        let growing = self.cones.iter(world).zip(&mut *self.starts);
+        let levels = growing.filter_map(|((cone, status, ..), start)| {
+            let grows = matches!(status, Status::Growing | Status::Waiting);
+            let stages = start.stages();
+            (grows && wanted(cone, stages)).then_some(stages.level)
+        });
+        levels.max().unwrap_or(0)
+    }
+
+    /// Has those growing cones wait whose error is too large, and sets how long a step each takes next. An error that is no number
+    /// stands: the state it belongs to ends the run.
+    fn judge(&mut self, world: &mut World, span: (u64, u64), deepest: u8) {
+        let (pair, duration) = (self.pair, self.duration);
+        each_growing(world, self.cones, self.starts, span, |step, mover| {
+            let (place, vector) = difference(step, mover, pair);
+            let radius = mover.cone.speed * duration.min(1.0 / step.growth.turning_rate);
+            mover.start.stages().error = place.norm() + radius * vector.norm();
+        });
+        let errors = self.cones.iter(world).zip(&mut *self.starts).filter(|(cone, _)| *cone.1 == Status::Growing);
+        let worst = errors.map(|(_, start)| start.stages().error).fold(0.0, largest);
+        let mut rejected = 0;
+        for ((_, mut status, ..), start) in self.cones.iter_mut(world).zip(&mut *self.starts) {
+            if *status != Status::Growing {
+                continue;
+            }
+            let stages = start.stages();
+            let (error, level) = match self.together {
+                true => (worst, stages.level.max(deepest)),
+                false => (stages.error, stages.level),
+            };
+            let stands = self.rule.stands(span, error);
+            stages.level = self.rule.next_level(span, error, level);
+            if stands {
+                self.taken += 1;
+                self.missed.extend((error > self.rule.tolerance).then_some(error));
+            } else {
+                rejected += 1;
+                status.set_if_neq(Status::Waiting);
+            }
+        }
+        world.resource_mut::<Counters>().rejected_steps += rejected;
+    }
+}
+
+/// The larger of two errors; NaN if one of them is.
+fn largest(worst: f64, error: f64) -> f64 {
+    if worst.is_nan() || error <= worst { worst } else { error }
+}
+
+/// What decides whether a step stands, and the size of the next.
+#[derive(Debug, Clone, Copy)]
+struct Rule {
+    /// Ticks of the clock's step.
+    whole: u64,
+    /// Largest error of a step (µm).
+    tolerance: f64,
+    /// Order of the result that is kept.
+    order: u32,
+}
+
+impl Rule {
+    /// Whether a step over a span of ticks stands. One of a tick does, whatever its error (µm), and one whose error is no number: the
+    /// state it belongs to ends the run.
+    fn stands(&self, (from, to): (u64, u64), error: f64) -> bool {
+        error <= self.tolerance || !error.is_finite() || to - from == 1
+    }
+
+    /// Halvings of the step after one with `level` of them over a span of ticks: as many as make it shorter, if that one does not stand;
+    /// one less, if with a step of twice the size the error is expected to stay within the tolerance.
+    fn next_level(&self, span: (u64, u64), error: f64, level: u8) -> u8 {
+        let ticks = span.1 - span.0;
+        if !self.stands(span, error) {
+            return (self.whole.ilog2() - shorter(ticks).ilog2()) as u8;
+        }
+        let longer = 2.0 * (self.whole >> level) as f64;
+        let expected = error * (longer / ticks as f64).powi(self.order as i32);
+        if expected <= SAFETY * self.tolerance { level.saturating_sub(1) } else { level }
+    }
 }
 
 /// The largest power of two below a number of ticks (2 or more).
@@ -152,84 +291,63 @@ fn shorter(ticks: u64) -> u64 {
     1 << (ticks - 1).ilog2()
 }
 
-/// Sets the next step after one over a span of ticks with an error (µm): twice as long if the error is expected to stay within
-/// the tolerance and the instant reached is one of those at which the longer steps begin.
-fn pace(world: &mut World, (from, to): (u64, u64), error: f64, order: u32) {
-    let Some(tolerance) = world.get_resource::<AdaptiveSteps>().map(|steps| steps.tolerance) else { return };
-    let stop = world.get_resource::<Kinks>().map_or(u64::MAX, |kinks| kinks.after(to));
-    let mut clock = world.resource_mut::<Clock>();
-    clock.stop = stop;
-    let longer = 2 * clock.step;
-    let growth = (longer as f64 / (to - from) as f64).powi(order as i32);
-    if longer <= clock.grid.step_ticks() && to % longer == 0 && error * growth <= SAFETY * tolerance {
-        clock.step = longer;
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::clock::TimeGrid;
 
-    fn world(step: u64, kink: u64) -> World {
-        let mut world = World::new();
-        let grid = TimeGrid::new(1.0).unwrap();
-        world.insert_resource(Clock { step, ..Clock::new(grid, 10 * grid.step_ticks()) });
-        world.insert_resource(AdaptiveSteps::new(1e-3, 10.0));
-        world.init_resource::<Health>();
-        let mut kinks = Kinks::default();
-        kinks.add(kink);
-        world.insert_resource(kinks);
-        world
+    const WHOLE: u64 = 1 << 20;
+
+    fn rule() -> Rule {
+        Rule { whole: WHOLE, tolerance: 1e-3, order: 3 }
     }
 
     #[test]
-    fn a_step_doubles_where_the_grid_allows_and_the_error_will_stay_within_the_tolerance() {
-        let whole = TimeGrid::new(1.0).unwrap().step_ticks();
-        let step = whole / 4;
-        let after = |from: u64, to: u64, error: f64| {
-            let mut world = world(step, u64::MAX - 1);
-            pace(&mut world, (from, to), error, 3);
-            world.resource::<Clock>().step
-        };
-        assert_eq!(after(step, 2 * step, 0.99e-4), 2 * step);
-        assert_eq!(after(step, 2 * step, 1.01e-4), step, "eight times the error is too much");
-        assert_eq!(after(2 * step, 3 * step, 0.0), step, "a longer step does not begin here");
-        assert_eq!(after(2 * step - 8, 2 * step, 1e-9), step, "the error of a short rest tells little");
-        let mut largest = world(whole, u64::MAX - 1);
-        pace(&mut largest, (0, whole), 0.0, 3);
-        assert_eq!(largest.resource::<Clock>().step, whole);
+    fn a_step_doubles_where_the_error_will_stay_within_the_tolerance() {
+        let quarter = (WHOLE / 4, WHOLE / 2);
+        assert_eq!(rule().next_level(quarter, 0.99e-4, 2), 1);
+        assert_eq!(rule().next_level(quarter, 1.01e-4, 2), 2, "eight times the error is too much");
+        assert_eq!(rule().next_level((WHOLE / 2 - 8, WHOLE / 2), 1e-9, 2), 2, "the error of a short rest tells little");
+        assert_eq!(rule().next_level((0, WHOLE), 0.0, 0), 0, "none is longer than the clock's");
     }
 
     #[test]
     fn a_rejected_step_becomes_the_next_smaller_power_of_two() {
         assert_eq!([2, 3, 4, 5, 1 << 40].map(shorter), [1, 2, 2, 4, 1 << 39]);
+        assert_eq!(rule().next_level((0, WHOLE), 2e-3, 0), 1);
+        assert_eq!(rule().next_level((0, 5), 2e-3, 0), 18, "of a short rest too");
     }
 
     #[test]
-    fn the_clock_stops_at_the_next_kink_only() {
-        let mut world = world(1 << 20, 12345);
-        pace(&mut world, (0, 100), 0.0, 3);
-        assert_eq!(world.resource::<Clock>().stop, 12345);
-        pace(&mut world, (100, 12345), 0.0, 3);
-        assert_eq!(world.resource::<Clock>().stop, u64::MAX);
-    }
-
-    #[test]
-    fn only_one_tick_is_accepted_with_too_large_an_error_and_the_largest_of_these_is_noted() {
-        let mut world = world(1, u64::MAX - 1);
-        assert!(is_accepted(&mut world, 1e-3, 8) && !is_accepted(&mut world, 1.1e-3, 2));
-        assert!(world.resource::<Health>().notes().is_empty());
-        for error in [2e-3, 5e-3, 3e-3] {
-            assert!(is_accepted(&mut world, error, 1));
-        }
-        let notes = world.resource::<Health>().notes();
+    fn only_one_tick_stands_with_too_large_an_error_and_the_largest_of_these_is_noted() {
+        assert!(rule().stands((0, 8), 1e-3) && !rule().stands((0, 2), 1.1e-3));
+        assert!(rule().stands((7, 8), 2e-3) && rule().stands((0, 8), f64::NAN));
+        let (mut steps, mut health) = (AdaptiveSteps::new(1e-3, 10.0), Health::default());
+        steps.note_misses(&[], &mut health);
+        assert!(health.notes().is_empty());
+        steps.note_misses(&[2e-3, 5e-3], &mut health);
+        steps.note_misses(&[3e-3], &mut health);
         assert_eq!(
-            notes,
+            health.notes(),
             [
                 "time: the tolerance was missed in 3 steps of one tick, by an error of up to 5.000e-3 um instead of 1.000e-3 um"
             ]
         );
-        assert!(is_accepted(&mut world, f64::NAN, 8));
+    }
+
+    #[test]
+    fn the_clock_stops_at_the_next_kink_only_where_steps_are_adaptive() {
+        use crate::model::clock::TimeGrid;
+        let mut world = World::new();
+        world.insert_resource(Clock::new(TimeGrid::new(1.0).unwrap(), 1 << 40));
+        let mut kinks = Kinks::default();
+        kinks.add(12345);
+        world.insert_resource(kinks);
+        reach(&mut world, 100);
+        assert_eq!((world.resource::<Clock>().now, world.resource::<Clock>().stop), (100, u64::MAX));
+        world.insert_resource(AdaptiveSteps::new(1e-3, 10.0));
+        reach(&mut world, 101);
+        assert_eq!(world.resource::<Clock>().stop, 12345);
+        reach(&mut world, 12345);
+        assert_eq!(world.resource::<Clock>().stop, u64::MAX);
     }
 }

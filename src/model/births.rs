@@ -1,16 +1,14 @@
 //! Births: each axon starts at its own instant, at its own place on the border, heading into the tissue.
 
-use super::adaptive::AdaptiveSteps;
 use super::clock::Clock;
 use super::components::{GrowthCone, Journey, Position, Site, SpringState, Status, Velocity};
 use super::configuration::Configuration;
-use super::movers::{ConeQuery, StepStart};
 use super::shafts::Shafts;
 use super::tissue::Tissue;
 use crate::kept;
 use crate::numerics::coordinates::AtVertices;
 use crate::numerics::simplex_mesh::BorderFacet;
-use bevy_ecs::prelude::{Component, Query, Res, ResMut, Resource, With, World};
+use bevy_ecs::prelude::{Component, Query, Res, ResMut, Resource, With};
 use nalgebra::Vector3;
 
 /// Where a growth cone starts, and which way.
@@ -58,17 +56,6 @@ impl BirthQueue {
         let from = self.next;
         self.next += due;
         &self.order[from..self.next]
-    }
-
-    /// Takes births at or after an instant back into the queue.
-    fn give_back(&mut self, instant: u64) {
-        self.next = self.next.min(self.order.partition_point(|(birth, _)| *birth < instant));
-    }
-
-    /// The cones that have been born at or after an instant, in order of birth.
-    fn since(&self, instant: u64) -> &[(u64, u32)] {
-        let born = &self.order[..self.next];
-        &born[born.partition_point(|(birth, _)| *birth < instant)..]
     }
 }
 
@@ -137,13 +124,11 @@ type Unborn = (
     &'static mut Journey,
 );
 
-/// Starts the cones whose birth falls into the coming step. A step that may be taken back lays no shafts: those of its
-/// newborn wait until it is accepted.
+/// Starts the cones whose birth falls into the coming step.
 pub fn give_birth(
     clock: Res<Clock>,
     tissue: Res<Tissue>,
     configuration: Res<Configuration>,
-    adaptive: Option<Res<AdaptiveSteps>>,
     mut queue: ResMut<BirthQueue>,
     mut shafts: ResMut<Shafts>,
     mut cones: Query<Unborn, With<GrowthCone>>,
@@ -174,44 +159,7 @@ pub fn give_birth(
         };
         let place = (origins[i].site, configuration.position(&tissue.mesh, origins[i].site));
         columns.at(i).begin(place, heading, cones[i].speed, cones[i].birth_time);
-        if adaptive.is_none() {
-            let at = tissue.reference_position(origins[i].site);
-            shafts.start(i, origins[i].site, [at.x, at.y], cones[i].birth_time);
-        }
+        let at = tissue.reference_position(origins[i].site);
+        shafts.start(i, origins[i].site, [at.x, at.y], cones[i].birth_time);
     }
-}
-
-/// Lays the first point of the shaft of every cone born at or after an instant (ticks).
-pub(super) fn lay_origins(world: &mut World, from: u64) {
-    let Some(mut cones) = world.try_query_filtered::<(&GrowthCone, &Origin), With<GrowthCone>>() else { return };
-    world.resource_scope::<Shafts, _>(|world, mut shafts| {
-        let born = world.resource::<BirthQueue>().since(from);
-        if born.is_empty() {
-            return;
-        }
-        let tissue = world.resource::<Tissue>();
-        let all: Vec<_> = cones.iter(world).collect();
-        for &(_, index) in born {
-            let (cone, origin) = all[index as usize];
-            let at = tissue.reference_position(origin.site);
-            shafts.start(index as usize, origin.site, [at.x, at.y], cone.birth_time);
-        }
-    });
-}
-
-/// Makes cones unborn again whose birth does not fall into a step that now ends at `to` (ticks); returns how many.
-pub(super) fn send_back(world: &mut World, cones: &mut ConeQuery, starts: &mut [StepStart], to: u64) -> u64 {
-    world.resource_mut::<BirthQueue>().give_back(to);
-    let mut count = 0;
-    for ((cone, mut status, mut site, mut position, mut velocity, mut spring, mut journey), start) in
-        cones.iter_mut(world).zip(starts)
-    {
-        if *status == Status::Growing && cone.birth >= to {
-            (*status, *site, *position) = (Status::Unborn, start.site, Position::default());
-            (*velocity, *spring, *journey) = (Velocity::default(), SpringState::default(), Journey::default());
-            start.fault = None;
-            count += 1;
-        }
-    }
-    count
 }

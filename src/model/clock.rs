@@ -61,7 +61,7 @@ impl TimeGrid {
     }
 }
 
-/// Where the run stands: the instant reached, the end, the grid, and the step that is tried next.
+/// Where the run stands: the instant reached, the end, and the grid.
 #[derive(Debug, Clone, Copy, Resource)]
 pub struct Clock {
     /// The dyadic grid.
@@ -70,18 +70,16 @@ pub struct Clock {
     pub now: u64,
     /// The last instant of the run, in ticks.
     pub end: u64,
-    /// The step that is tried next, in ticks: a power of two, at most that of the grid. Only an adaptive method changes it.
-    pub step: u64,
     /// An instant that the coming step may not pass, in ticks; `u64::MAX` if there is none.
     pub stop: u64,
 }
 
-kept! { struct Clock { grid, now, end, step, stop } }
+kept! { struct Clock { grid, now, end, stop } }
 
 impl Clock {
     /// A clock at the start of a run that ends at `end` (ticks).
     pub fn new(grid: TimeGrid, end: u64) -> Self {
-        Self { grid, now: 0, end, step: grid.step_ticks(), stop: u64::MAX }
+        Self { grid, now: 0, end, stop: u64::MAX }
     }
 
     /// Time reached (h).
@@ -89,17 +87,16 @@ impl Clock {
         self.grid.hours(self.now)
     }
 
-    /// Ticks of the step that comes next. It ends at a multiple of itself, so that multiples of the largest step are always
-    /// met; the one before a stop, the one after it and the last one may be shorter.
+    /// Ticks of the step that comes next. It ends at a multiple of the grid's step; the one before a stop, the one after it and the last
+    /// one may be shorter.
     pub fn next_step(&self) -> u64 {
-        let whole = self.step - self.now % self.step;
+        let whole = self.grid.step - self.now % self.grid.step;
         whole.min(self.end - self.now).min(self.stop - self.now)
     }
 
     /// Whether a clock at the start of a run may stand as `later` does.
     pub(super) fn may_become(&self, later: &Self) -> bool {
-        let step = later.step.is_power_of_two() && later.step <= self.grid.step;
-        (later.grid, later.end) == (self.grid, self.end) && step && later.now <= later.end && later.now < later.stop
+        (later.grid, later.end) == (self.grid, self.end) && later.now <= later.end && later.now < later.stop
     }
 
     /// Whether the end is reached.
@@ -157,22 +154,18 @@ mod tests {
     }
 
     #[test]
-    fn steps_end_at_multiples_of_themselves_and_at_stops() {
+    fn steps_end_at_multiples_of_the_grid_s_and_at_stops() {
         let grid = TimeGrid::new(1.0).unwrap();
         let whole = grid.step_ticks();
         let mut kinks = Kinks::default();
         [whole + 5, 7, 7].into_iter().for_each(|kink| kinks.add(kink));
-        let mut clock = Clock { stop: kinks.after(0), step: whole / 4, ..Clock::new(grid, 2 * whole + 3) };
+        let mut clock = Clock { stop: kinks.after(0), ..Clock::new(grid, 2 * whole + 3) };
         let mut met = Vec::new();
         while !clock.is_over() {
             clock.now += clock.next_step();
             clock.stop = kinks.after(clock.now);
             met.push(clock.now);
-            if clock.now == whole / 2 {
-                clock.step = whole / 2;
-            }
         }
-        let half = whole / 2;
-        assert_eq!(met, [7, half / 2, half, whole, whole + 5, whole + half, 2 * whole, 2 * whole + 3]);
+        assert_eq!(met, [7, whole, whole + 5, 2 * whole, 2 * whole + 3]);
     }
 }

@@ -55,16 +55,18 @@ pub enum Status {
     Retracting,
     /// Drawn back to where it began, for good.
     Withdrawn,
+    /// Growing, but not in the part of a step that is under way: seen only within steps of cones' own size.
+    Waiting,
 }
 
-kept! { enum Status { Unborn, Growing, Stalled, Arrived, Left, Retracting, Withdrawn } }
+kept! { enum Status { Unborn, Growing, Stalled, Arrived, Left, Retracting, Withdrawn, Waiting } }
 
 impl Status {
     /// The word used in results.
     pub fn word(self) -> &'static str {
         match self {
             Status::Unborn => "unborn",
-            Status::Growing => "growing",
+            Status::Growing | Status::Waiting => "growing",
             Status::Stalled => "stalled",
             Status::Arrived => "arrived",
             Status::Left => "left",

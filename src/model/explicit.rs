@@ -7,7 +7,7 @@
 use super::clock::Clock;
 use super::components::SpringState;
 use super::integrator::{bring_tissue_to, evaluate_right_hand_side};
-use super::movers::{ConeQuery, Mover, Stages, Step, StepStart, each_growing, flat};
+use super::movers::{ConeQuery, Mover, Step, StepStart, each_growing, flat};
 use crate::numerics::runge_kutta::ButcherTableau;
 use crate::numerics::turning::perpendicular_part;
 use crate::numerics::walk::{BorderRule, nowhere, walk};
@@ -96,13 +96,11 @@ pub(super) fn finish(step: &Step, mover: &mut Mover, tableau: &ButcherTableau) {
     step.travel(mover, from, step.tissue.mesh.vertices(), shift, length);
 }
 
-/// Takes a cone back to the start of a step whose first stage has been evaluated, for a step of another length. What that
-/// stage sampled holds for any length; only the kick of the first half is another.
+/// Begins a step of another length with a cone that was taken back. What its first stage sampled holds for any length; only the kick of
+/// the first half is another.
 pub(super) fn start_again(step: &Step, mover: &mut Mover) {
     let start = &mut *mover.start;
-    let Stages { sampled, unkicked, .. } = *start.stages();
-    (*mover.site, *mover.spring) = (start.site, sampled);
-    start.heading = unkicked;
+    start.heading = start.stages().unkicked;
     start.fault = None;
     keep_rates(step, mover, 0);
 }

@@ -72,7 +72,7 @@ impl Health {
 pub struct Counters {
     /// Steps Δt in which something grew.
     pub steps: u64,
-    /// Steps that an adaptive method tried and took back.
+    /// Steps of single cones that an adaptive method tried and took back.
     pub rejected_steps: u64,
     /// Steps of growing cones.
     pub cone_steps: u64,

@@ -7,7 +7,7 @@
 //! The explicit methods (the paper's "Runge–Kutta") stand in `explicit.rs`, the choice of their steps by a tolerance
 //! in [`super::adaptive`].
 
-use super::adaptive::{adaptive_step, idle_until};
+use super::adaptive::{adaptive_step, reach};
 use super::clock::{Clock, StageTime};
 use super::components::Status;
 use super::configuration::Configuration;
@@ -27,11 +27,10 @@ use nalgebra::{Rotation3, Vector3};
 /// Bytes that are kept of a growth cone during a step.
 pub const BYTES_A_STEP: usize = size_of::<StepStart>();
 
-/// Runs one step for all growing cones, up to the clock's next instant or nearer if the step is adaptive, and leaves the
-/// tissue at the instant reached.
+/// Runs one step for all growing cones, up to the clock's next instant, and leaves the tissue there.
 pub fn advance(world: &mut World, cones: &mut ConeQuery, mut starts: Local<Vec<StepStart>>) {
     let clock = *world.resource::<Clock>();
-    let (from, mut to) = (clock.now, clock.now + clock.next_step());
+    let (from, to) = (clock.now, clock.now + clock.next_step());
     starts.resize_with(cones.iter(world).count(), StepStart::default);
     let mut growing = cones.iter(world).filter(|cone| *cone.1 == Status::Growing).count() as u64;
     if growing > 0 {
@@ -41,18 +40,14 @@ pub fn advance(world: &mut World, cones: &mut ConeQuery, mut starts: Local<Vec<S
             Method::Heun => explicit_step(world, cones, &mut starts, (from, to), &HEUN),
             Method::Rk4 => explicit_step(world, cones, &mut starts, (from, to), &RK4),
             Method::BogackiShampine => {
-                let taken = adaptive_step(world, cones, &mut starts, &BOGACKI_SHAMPINE);
-                to = taken.to;
-                growing -= taken.sent_back;
+                growing = adaptive_step(world, cones, &mut starts, (from, to), &BOGACKI_SHAMPINE)
             }
         }
-    } else {
-        idle_until(world, to);
     }
     let mut counters = world.resource_mut::<Counters>();
     counters.steps += 1;
     counters.cone_steps += growing;
-    world.resource_mut::<Clock>().now = to;
+    reach(world, to);
     bring_tissue_to(world, clock.grid.hours(to));
     report_lost_cones(world, &starts);
 }

@@ -4,6 +4,7 @@
 //! *rates*: pulls, speed factors, heading diffusion, spin. It never moves a cone and never sees Δt, so that the method
 //! stays a choice of the scenario. A mechanism that is absent costs nothing: it is not installed.
 
+use super::adaptive::AdaptiveSteps;
 use super::components::GrowthCone;
 use super::health::Health;
 use super::keep::Keep;
@@ -216,6 +217,15 @@ impl<'a> ModelBuilder<'a> {
         let schedule = &mut self.schedules.motion;
         schedule.configure_sets(after(slot, (0..self.slot).map(Slot::Motion)).in_set(Motion::Matrix));
         schedule.add_systems(system.in_set(slot));
+        self
+    }
+
+    /// Tells that cones act on one another within a step, not by their shafts alone: where a tolerance chooses steps, they then
+    /// take steps of one size.
+    pub fn acts_between_cones(&mut self) -> &mut Self {
+        if let Some(mut steps) = self.world.get_resource_mut::<AdaptiveSteps>() {
+            steps.together = true;
+        }
         self
     }
 

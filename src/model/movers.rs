@@ -51,12 +51,22 @@ pub(super) struct Stages {
     pub(super) sampled: SpringState,
     /// Estimated error of the step (µm), for an embedded pair.
     pub(super) error: f64,
+    /// Halvings of the clock's step that the cone takes, and the instant (ticks) it has come to.
+    pub(super) level: u8,
+    pub(super) reached: u64,
 }
 
 impl StepStart {
     /// What several stages keep, made if it is not there yet.
     pub(super) fn stages(&mut self) -> &mut Stages {
         self.stages.get_or_insert_default()
+    }
+
+    /// Site and spring state before the first stage, with the pull that it found.
+    pub(super) fn taken_back(&mut self) -> (Site, SpringState) {
+        let (site, drift) = (self.site, self.drift);
+        let Stages { unkicked, sampled, .. } = *self.stages();
+        (site, SpringState { heading: unkicked, drift, ..sampled })
     }
 
     /// What the stages so far found; nothing before the first.

@@ -2,6 +2,7 @@
 //! never written all the same: what the scene alone decides must be as the scene decides it, and what names a cell, a cone or a block must
 //! name one that is there. Looked at is the state of the core; mechanisms [look at their own](super::mechanism::ModelBuilder::sound_if).
 
+use super::adaptive::AdaptiveSteps;
 use super::births::BirthQueue;
 use super::clock::{Clock, StageTime};
 use super::components::{GrowthCone, Site, Status};
@@ -18,6 +19,7 @@ const LATEST: f64 = 1.0 + 1e-9;
 /// What a world that has just been put together says of any state of its scene.
 pub(super) struct Given {
     clock: Option<Clock>,
+    steps: Option<AdaptiveSteps>,
     births: Option<BirthQueue>,
     spares: Option<SpareCones>,
     shafts: Option<Shafts>,
@@ -29,6 +31,7 @@ impl Given {
     pub(super) fn of(world: &World) -> Self {
         Self {
             clock: world.get_resource::<Clock>().copied(),
+            steps: world.get_resource::<AdaptiveSteps>().cloned(),
             births: world.get_resource::<BirthQueue>().cloned(),
             spares: world.get_resource::<SpareCones>().cloned(),
             shafts: world.get_resource::<Shafts>().cloned(),
@@ -52,6 +55,7 @@ impl Given {
                     (0.0..=LATEST * clock.grid.hours(clock.end)).contains(&stage.0)
                 }),
             ),
+            ("adaptive steps", both(&self.steps, world.get_resource(), |given, read| self.steps_fit(given, read))),
             ("births", both(&self.births, world.get_resource(), BirthQueue::may_become)),
             ("spare cones", both(&self.spares, world.get_resource(), SpareCones::may_become)),
             ("counters", world.get_resource().is_none_or(Counters::may_be)),
@@ -67,6 +71,11 @@ impl Given {
             Some(defect) => Err(Damage(format!("`shafts`: {defect}"))),
             None => Ok(()),
         }
+    }
+
+    fn steps_fit(&self, given: &AdaptiveSteps, read: &AdaptiveSteps) -> bool {
+        let step = self.clock.map_or(1, |clock| clock.grid.step_ticks());
+        given.may_become(read, step, self.cones.len())
     }
 }
 
@@ -89,7 +98,13 @@ fn sites_are_in(cells: usize, world: &World) -> bool {
 /// Whether all cones that have begun were born by now (ticks).
 fn nobody_grows_before_birth(now: u64, world: &World) -> bool {
     let Some(mut cones) = world.try_query::<(&GrowthCone, &Status)>() else { return true };
-    cones.iter(world).all(|(cone, status)| *status == Status::Unborn || cone.birth <= now)
+    let fits = |cone: &GrowthCone, status| match status {
+        Status::Unborn => true,
+        // Seen only within steps.
+        Status::Waiting => false,
+        _ => cone.birth <= now,
+    };
+    cones.iter(world).all(|(cone, status)| fits(cone, *status))
 }
 
 #[cfg(test)]
@@ -119,6 +134,20 @@ mod tests {
     }
 
     #[test]
+    fn steps_of_no_run_are_refused() {
+        let with = |levels: Vec<u8>| {
+            let mut world = world(0, [(0, Status::Unborn); 2]);
+            world.insert_resource(AdaptiveSteps { levels, ..AdaptiveSteps::new(0.01, 10.0) });
+            world
+        };
+        let fits = |levels| Given::of(&with(Vec::new())).fits(&with(levels)).map_err(|damage| damage.to_string());
+        assert_eq!((fits(Vec::new()), fits(vec![0, 3])), (Ok(()), Ok(())));
+        for levels in [vec![1], vec![0, 64]] {
+            assert!(fits(levels).unwrap_err().contains("`adaptive steps`"));
+        }
+    }
+
+    #[test]
     fn a_cone_that_grows_before_its_birth_is_of_no_run() {
         let step = TimeGrid::new(0.1).unwrap().step_ticks();
         let fresh = world(0, [(step, Status::Unborn), (u64::MAX, Status::Unborn)]);
@@ -134,5 +163,6 @@ mod tests {
             let refused = fits(step, (2 * step, status)).unwrap_err();
             assert!(refused.contains("`statuses`"), "{refused}");
         }
+        assert!(fits(step, (step, Status::Waiting)).is_err(), "none waits between steps");
     }
 }

@@ -68,7 +68,7 @@ fn tip(tip: &TipView) -> Option<Tip> {
     let status = match tip.status {
         Status::Unborn => return None,
         Status::Withdrawn if tip.is_branch => return None,
-        Status::Growing => TipStatus::Growing,
+        Status::Growing | Status::Waiting => TipStatus::Growing,
         Status::Arrived => TipStatus::Arrived,
         Status::Stalled => TipStatus::Stalled,
         Status::Left => TipStatus::Left,

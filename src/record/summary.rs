@@ -176,7 +176,7 @@ pub fn counts(world: &World) -> Counts {
         }
         match if arrivals.contains_key(&tip.axon) { Status::Arrived } else { tip.status } {
             Status::Unborn => {}
-            Status::Growing => counts.growing += 1,
+            Status::Growing | Status::Waiting => counts.growing += 1,
             Status::Arrived => counts.arrived += 1,
             Status::Stalled => counts.stalled += 1,
             Status::Left => counts.left += 1,

@@ -117,7 +117,7 @@ fn clock(scene: &Scene) -> Result<Clock, AssemblyError> {
     Ok(Clock::new(grid, grid.nearest(scene.time.duration.0)))
 }
 
-/// Lets steps of adaptive size end at the kinks that the mechanisms have told.
+/// Lets adaptive steps end at the kinks that the mechanisms have told.
 fn stop_at_first_kink(world: &mut World) {
     if world.contains_resource::<AdaptiveSteps>() {
         let first = world.get_resource::<Kinks>().map_or(u64::MAX, |kinks| kinks.after(0));
@@ -296,7 +296,9 @@ fn plan(world: &mut World, loaded: &Loaded, roster: &Roster) {
     if let Some(tolerance) = tolerance {
         plan.keep(
             "adaptive steps",
-            format!("the error of a step stays within {tolerance} um; numbers of steps are those at the largest step"),
+            format!(
+                "each cone takes its own, with an error within {tolerance} um; numbers of steps are those at the largest"
+            ),
         );
     }
     for Population { name, speed, .. } in populations {

@@ -9,7 +9,7 @@ mod populate;
 pub use assemble::AssemblyError;
 pub use populate::BYTES_AN_AXON;
 
-use crate::model::adaptive::idle_until;
+use crate::model::adaptive::reach;
 use crate::model::clock::{Clock, StageTime};
 use crate::model::components::{GrowthCone, Status};
 use crate::model::configuration::Configuration;
@@ -80,7 +80,7 @@ impl Simulation {
         *self.world.resource::<Counters>()
     }
 
-    /// One step Δt, or less if an adaptive method needs it. A step in which no cone grows and none is born only moves the clock.
+    /// One step Δt. A step in which no cone grows and none is born only moves the clock.
     ///
     /// # Errors
     /// The fault that ends the run; the state is that of the step's end.
@@ -88,7 +88,7 @@ impl Simulation {
         let clock = *self.world.resource::<Clock>();
         let to = clock.now + clock.next_step();
         if self.is_idle(to) {
-            idle_until(&mut self.world, to);
+            reach(&mut self.world, to);
             return Ok(());
         }
         self.bring_tissue_here();

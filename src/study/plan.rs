@@ -2,7 +2,6 @@
 
 use super::estimate::{Estimate, Expectation, memory, seconds};
 use super::run::{DPI, Records, RunError, assembled, recorder_options};
-use crate::model::adaptive::AdaptiveSteps;
 use crate::model::clock::Clock;
 use crate::model::components::GrowthCone;
 use crate::model::health::{Counters, Health};
@@ -114,8 +113,7 @@ fn figure_of(world: &World, expected: &Expectation) -> Result<Option<PictureSize
 fn expected_of(world: &World, loaded: &Loaded, keep: Records) -> (Expectation, Recorder) {
     let clock = world.resource::<Clock>();
     // Points are met at steps only.
-    let shortest = if world.contains_resource::<AdaptiveSteps>() { 1 } else { clock.grid.step_ticks() };
-    let interval = clock.grid.nearest(loaded.scene.output.trajectory_interval.0).max(shortest);
+    let interval = clock.grid.nearest(loaded.scene.output.trajectory_interval.0).max(clock.grid.step_ticks());
     let lifetimes = if keep.trajectories { lifetimes(world, clock) } else { Vec::new() };
     let points = lifetimes.iter().map(|ticks| ticks / interval + 1).sum();
     let recorder = Recorder::new(&recorder_options(loaded, keep), &clock.grid, clock.end);

@@ -1,10 +1,12 @@
-//! Steps that a tolerance chooses: their error, their cost, and that what was rejected leaves no trace.
+//! Steps of cones' own size that a tolerance chooses: their error, their cost, that what was rejected leaves no trace, and that no cone
+//! takes the steps of another.
 
 use crate::common::{ConeState, assembled, cones, ended, fitted_order, hash_of_states};
 use crate::figures::{self, Curve};
 use crate::front::Front;
 use crate::trajectories::{reference, scene as reference_scene, with_exact_field, worst_errors_and_cost};
 use serde_json::{Value, json};
+use tropism::model::adaptive::AdaptiveSteps;
 use tropism::model::shafts::Shafts;
 use tropism::prelude::*;
 use tropism::systems;
@@ -66,7 +68,8 @@ fn with_any_error_allowed_the_pair_is_a_method_of_order_three_in_position_and_in
 #[test]
 fn the_error_of_a_run_is_proportional_to_the_tolerance_over_three_decades() {
     let reference = reference("trajectories");
-    let tolerances: Vec<f64> = (0..=10).map(|k| 1e-5 * 0.5f64.powi(k)).collect();
+    // Down from where the largest step is no longer good enough.
+    let tolerances: Vec<f64> = (0..=10).map(|k| 1e-6 * 0.5f64.powi(k)).collect();
     let errors: Vec<[f64; 2]> = tolerances
         .iter()
         .map(|&tolerance| {
@@ -113,6 +116,11 @@ fn a_sharp_front_is_met_with_short_steps_and_crossed_within_the_tolerance() {
     }
 }
 
+/// Evaluations of the pull of single cones, four a step.
+fn evaluations(cost: &Counters) -> u64 {
+    4 * (cost.cone_steps + cost.rejected_steps)
+}
+
 #[test]
 fn at_equal_error_a_sharp_front_costs_fewer_evaluations_than_with_fixed_steps() {
     let thin = |method: &str, step: f64, tolerance: Option<f64>| {
@@ -122,16 +130,88 @@ fn at_equal_error_a_sharp_front_costs_fewer_evaluations_than_with_fixed_steps() 
     };
     let exact = cones(thin("rk4", 0.4 / 2048.0, None).world());
     let pair = thin(PAIR, 0.4, Some(1e-3));
-    let (error, stages) = (farthest(&cones(pair.world()), &exact), pair.counters().stages);
+    let (error, needed) = (farthest(&cones(pair.world()), &exact), evaluations(&pair.counters()));
     let fixed: Vec<_> = (4..10)
         .map(|halvings| {
             let run = thin("rk4", 0.4 * 0.5f64.powi(halvings), None);
-            (farthest(&cones(run.world()), &exact), run.counters().stages)
+            (farthest(&cones(run.world()), &exact), evaluations(&run.counters()))
         })
         .collect();
-    println!("pair: {error:.2e} um with {stages} evaluations; rk4: {fixed:?}");
-    let (_, needed) = fixed.iter().find(|run| run.0 <= error).unwrap();
-    assert!(2 * stages < *needed, "{stages} against {needed}");
+    println!("pair: {error:.2e} um with {needed} evaluations; rk4: {fixed:?}");
+    let (_, of_fixed) = fixed.iter().find(|run| run.0 <= error).unwrap();
+    assert!(2 * needed < *of_fixed, "{needed} against {of_fixed}");
+}
+
+/// Cones that cross a sharp front one after the other.
+fn crossing(count: usize, tolerance: f64) -> Value {
+    let mut scene = front(PAIR, 0.4, Some(tolerance));
+    let places: Vec<_> = (0..count).map(|i| [120 + 10 * i, 30 + 8 * i]).collect();
+    scene["populations"]["axons"]["count"] = json!(count);
+    scene["populations"]["axons"]["origin"] = json!({ "points": places });
+    scene
+}
+
+#[test]
+fn a_cone_takes_the_same_steps_whoever_else_is_there() {
+    let all = ended(&crossing(8, 1e-4), &roster());
+    let mut steps = 0;
+    for (i, cone) in cones(all.world()).iter().enumerate() {
+        let mut scene = crossing(8, 1e-4);
+        scene["populations"]["axons"]["count"] = json!(1);
+        scene["populations"]["axons"]["origin"]["points"] = json!([[120 + 10 * i, 30 + 8 * i]]);
+        let alone = ended(&scene, &roster());
+        let tip = &cones(alone.world())[0];
+        assert_eq!((tip.position, tip.spring.heading), (cone.position, cone.spring.heading), "cone {i}");
+        steps += alone.counters().cone_steps;
+    }
+    assert_eq!(all.counters().cone_steps, steps);
+    assert!(steps > 8 * 16 + 50, "{steps}: the front asks for short steps");
+}
+
+/// Says that cones act on one another, and adds nothing.
+#[derive(Debug, Default, Deserialize, JsonSchema)]
+struct Coupled {}
+
+impl Mechanism for Coupled {
+    const NAME: &'static str = "coupled";
+
+    fn install(self, model: &mut ModelBuilder) -> Result<(), InstallError> {
+        model.acts_between_cones();
+        Ok(())
+    }
+}
+
+#[test]
+fn where_cones_act_on_one_another_all_take_the_steps_of_the_one_that_needs_the_shortest() {
+    let roster = roster().with::<Coupled>();
+    let own = ended(&crossing(8, 1e-3), &roster);
+    let mut scene = crossing(8, 1e-3);
+    scene["coupled"] = json!({});
+    let mut together = assembled(&scene, &roster);
+    while !together.is_over() {
+        together.step().unwrap();
+        let levels = &together.world().resource::<AdaptiveSteps>().levels;
+        assert!(levels.iter().all(|level| *level == levels[0]), "{levels:?}");
+    }
+    let exact = cones(
+        ended(
+            &{
+                let mut fixed = crossing(8, 1e-3);
+                fixed["time"] = front("rk4", 0.4 / 1024.0, None)["time"].clone();
+                fixed
+            },
+            &roster,
+        )
+        .world(),
+    );
+    let errors = [&own, &together].map(|run| farthest(&cones(run.world()), &exact));
+    let counts = [&own, &together].map(|run| evaluations(&run.counters()));
+    println!(
+        "own: {:.2e} um with {}, together: {:.2e} um with {} evaluations",
+        errors[0], counts[0], errors[1], counts[1]
+    );
+    assert!(errors.iter().all(|error| *error < 2e-2), "{errors:?}");
+    assert!(2 * counts[0] < counts[1], "{counts:?}");
 }
 
 #[test]
@@ -164,45 +244,42 @@ fn cones_are_born_inside_steps_and_those_of_a_rejected_rest_wait_for_their_own_s
 
 #[test]
 fn a_rejected_step_leaves_no_trace() {
-    let mut coarse = assembled(&full(0.8, 1e-4), &roster());
-    coarse.step().unwrap();
-    let step = coarse.time();
-    assert!(coarse.counters().rejected_steps >= 2 && step <= 0.2, "{step}");
-    let mut fine = assembled(&full(step, 1e-4), &roster());
-    fine.step().unwrap();
-    assert_eq!((fine.time(), fine.counters().rejected_steps), (step, 0));
-    assert_eq!(hash_of_states(coarse.world()), hash_of_states(fine.world()));
-    let shafts = |world: &World| {
-        let shafts = world.resource::<Shafts>();
-        (0..shafts.count()).map(|shaft| shafts.polyline(shaft)).collect::<Vec<_>>()
+    let ended_with = |step: f64| {
+        let mut scene = full(step, 1e-5);
+        scene["populations"]["axons"]["births"] = json!({ "at": 0 });
+        scene["fasciculation"] = Value::Null;
+        ended(&scene, &roster())
     };
-    assert_eq!(shafts(coarse.world()), shafts(fine.world()));
+    // All steps that stand are shorter than the largest of these, so that more are tried with it, and the same stand.
+    let (fine, coarse) = (ended_with(0.4), ended_with(1.6));
+    let [few, more] = [&fine, &coarse].map(|run| run.counters());
+    assert!(more.rejected_steps > few.rejected_steps, "{few:?} {more:?}");
+    assert_eq!(few.cone_steps, more.cone_steps);
+    let tips = |run: &tropism::simulation::Simulation| {
+        cones(run.world()).iter().map(|cone| (cone.position, cone.spring.heading, cone.status)).collect::<Vec<_>>()
+    };
+    assert_eq!(tips(&fine), tips(&coarse));
 }
 
 #[test]
-fn the_clock_holds_all_that_decides_the_next_step() {
+fn looking_between_steps_changes_nothing_and_the_clock_meets_its_steps_and_the_corners_of_the_load() {
     let interrupted = |other: bool| {
         let mut simulation = assembled(&full(0.8, 1e-2), &roster());
-        let mut clocks = Vec::new();
+        let mut met = Vec::new();
         while !simulation.is_over() {
             simulation.step().unwrap();
-            let clock = *simulation.world().resource::<Clock>();
-            assert!(clock.step.is_power_of_two() && clock.step <= clock.grid.step_ticks());
-            assert!(clock.now == clock.end || clock.next_step() <= clock.step);
-            clocks.push((clock.now, clock.step));
+            met.push(simulation.world().resource::<Clock>().now);
             if other {
                 simulation.bring_tissue_here();
             }
         }
-        (clocks, hash_of_states(simulation.world()))
+        (met, hash_of_states(simulation.world()))
     };
-    let (clocks, hash) = interrupted(false);
-    assert_eq!((clocks.clone(), hash), interrupted(true));
-    // Multiples of the largest step and the corners of the load are met exactly.
+    let (met, hash) = interrupted(false);
+    assert_eq!((met.clone(), hash), interrupted(true));
     let grid = assembled(&full(0.8, 1e-2), &roster()).world().resource::<Clock>().grid;
-    let met = |instant: u64| clocks.iter().any(|(now, _)| *now == instant);
-    assert!((1..=4).all(|k| met(k * grid.step_ticks())));
-    assert!([0.9, 1.23456, 2.0].iter().all(|&time| met(grid.nearest(time))));
+    assert!((1..=4).all(|k| met.contains(&(k * grid.step_ticks()))));
+    assert!([0.9, 1.23456, 2.0].iter().all(|&time| met.contains(&grid.nearest(time))));
 }
 
 #[test]

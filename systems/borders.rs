@@ -45,11 +45,18 @@ impl Mechanism for Borders {
 /// Beyond this many ranges a border adds less than the rounding of a pull of 1, and is left out.
 const RANGES: f64 = 40.0;
 
-/// Bounding boxes in the present configuration.
+/// Bounding boxes of what the edges are in the present configuration, or in the part of a path that it belongs to.
 #[derive(Debug, Default, Resource)]
 struct EdgeBoxes {
-    revision: Option<u64>,
+    holds: Option<Holds>,
     edges: Vec<EdgeBox>,
+}
+
+/// For how long boxes hold.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Holds {
+    Revision(u64),
+    Part(usize),
 }
 
 type Bounds = [[f64; 2]; 2];
@@ -71,10 +78,11 @@ pub fn escape_angle(turning_rate: f64, weight: f64, range: f64, speed: f64) -> f
 }
 
 fn bound_edges(tissue: Res<Tissue>, configuration: Res<Configuration>, mut boxes: ResMut<EdgeBoxes>) {
-    if boxes.revision == Some(configuration.revision) {
+    let holds = configuration.part().map_or(Holds::Revision(configuration.revision), Holds::Part);
+    if boxes.holds == Some(holds) {
         return;
     }
-    boxes.revision = Some(configuration.revision);
+    boxes.holds = Some(holds);
     let bounds = |facets: &[BorderFacet]| bounding_box(&tissue, &configuration, facets);
     let of_edge =
         |facets: &Vec<BorderFacet>| EdgeBox { whole: bounds(facets), runs: facets.chunks(RUN).map(bounds).collect() };
@@ -84,10 +92,10 @@ fn bound_edges(tissue: Res<Tissue>, configuration: Res<Configuration>, mut boxes
 fn bounding_box(tissue: &Tissue, configuration: &Configuration, facets: &[BorderFacet]) -> Bounds {
     let mut bounds = [[f64::INFINITY; 2], [f64::NEG_INFINITY; 2]];
     for vertex in facets.iter().flat_map(|facet| tissue.mesh.facet_vertices(*facet)) {
-        let x = configuration.vertex(vertex as usize);
+        let [low, high] = configuration.range(vertex as usize);
         for k in 0..2 {
-            bounds[0][k] = bounds[0][k].min(x[k]);
-            bounds[1][k] = bounds[1][k].max(x[k]);
+            bounds[0][k] = bounds[0][k].min(low[k]);
+            bounds[1][k] = bounds[1][k].max(high[k]);
         }
     }
     bounds
@@ -154,6 +162,9 @@ fn edge_pull(
         }
     }
     let (nearest, away, along) = best;
+    if nearest >= (RANGES * range).powi(2) {
+        return Vector3::zeros();
+    }
     let distance = nearest.sqrt();
     let inward = if distance > 0.0 { away / distance } else { Vector3::new(-along.y, along.x, 0.0).normalize() };
     inward * (-distance / range).exp()

@@ -17,6 +17,8 @@ use std::sync::Arc;
 
 /// Cells that are looked at together for one that is turned over.
 const CELLS_AT_A_TIME: u32 = 4096;
+/// Room for round-off about where a vertex may be on a path, over its largest coordinate.
+const ROUND_OFF: f64 = 1e-12;
 /// Vertices that are moved together.
 const VERTICES_AT_A_TIME: usize = 4096;
 /// Vertices that are asked for about a growth cone at a stage, by what moves and steers it by itself. Ours.
@@ -74,6 +76,20 @@ impl OnPath {
         let rest = self.mesh.vertices()[vertex];
         let displaced = |k: usize| rest[k] + self.path.value(&self.place, 2 * vertex + k);
         [displaced(0), displaced(1)]
+    }
+
+    /// The smallest and the largest coordinates that a vertex has in this part of the path: those of its control points, with room for
+    /// round-off.
+    fn range(&self, vertex: usize) -> [[f64; 2]; 2] {
+        let rest = self.mesh.vertices()[vertex];
+        let mut range = [rest; 2];
+        for k in 0..2 {
+            let control = self.path.bernstein(self.place.part(), 2 * vertex + k).map(|u| rest[k] + u);
+            let room = ROUND_OFF * control.iter().fold(rest[k].abs(), |most, x| most.max(x.abs()));
+            range[0][k] = control.iter().copied().fold(f64::INFINITY, f64::min) - room;
+            range[1][k] = control.iter().copied().fold(f64::NEG_INFINITY, f64::max) + room;
+        }
+        range
     }
 
     /// Writes where all vertices are, and their velocities.
@@ -185,6 +201,17 @@ impl Configuration {
     #[inline]
     pub fn vertex(&self, vertex: usize) -> [f64; 2] {
         self.at(vertex)
+    }
+
+    /// The part of a path that this belongs to, where vertices are reckoned from it.
+    pub fn part(&self) -> Option<usize> {
+        self.on_path.as_ref().map(|on_path| on_path.place.part())
+    }
+
+    /// The box (µm) that a vertex does not leave as long as the [part](Self::part) is the same: of its coordinates alone where there is none.
+    pub fn range(&self, vertex: usize) -> [[f64; 2]; 2] {
+        let Some(on_path) = &self.on_path else { return [self.at(vertex); 2] };
+        on_path.range(vertex)
     }
 
     /// Coordinates of all vertices (µm).

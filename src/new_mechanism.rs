@@ -87,6 +87,22 @@ impl NewMechanism<'_> {
             None => Sources::nearest(),
         };
         let sources = sources.map_err(NewMechanismError::Refused)?;
+        if sources.depend_on(self.name) {
+            let message =
+                format!("`{}` cannot be the name of a mechanism: tropism depends on a crate of this name", self.name);
+            return Err(NewMechanismError::Refused(message));
+        }
+        match self.fill(&folder, &sources) {
+            Ok(files) => Ok(Written { folder, files, sources: sources.folder }),
+            Err(error) => {
+                // A part of a crate is of no use; if it cannot be removed, nothing more can be done.
+                let _ = std::fs::remove_dir_all(&folder);
+                Err(error.into())
+            }
+        }
+    }
+
+    fn fill(&self, folder: &Path, sources: &Sources) -> Result<Vec<String>, WriteError> {
         let mut files = Vec::new();
         for (path, template) in FILES {
             let path = path.replace(TEMPLATE[0], self.name);
@@ -97,7 +113,7 @@ impl NewMechanism<'_> {
             write_atomically(&folder.join("Cargo.lock"), lock.as_bytes())?;
             files.push("Cargo.lock".to_owned());
         }
-        Ok(Written { folder, files, sources: sources.folder })
+        Ok(files)
     }
 }
 
@@ -131,6 +147,12 @@ impl Sources {
         }
         let lock = std::fs::read_to_string(folder.join("Cargo.lock")).ok();
         Ok(Self { profiles: profiles_of(&manifest), lock, folder })
+    }
+
+    /// Whether a crate of this name is among what tropism is built of.
+    fn depend_on(&self, name: &str) -> bool {
+        let line = format!("name = \"{name}\"");
+        self.lock.as_ref().is_some_and(|lock| lock.lines().any(|found| found == line))
     }
 
     fn fill(&self, template: &str, name: &str) -> String {
@@ -226,6 +248,20 @@ mod tests {
             assert_eq!(check_name(name, &taken), Ok(()), "{name}");
         }
         assert_eq!(type_name("growth_cone_2x"), "GrowthCone2x");
+    }
+
+    #[test]
+    fn the_name_of_a_crate_that_tropism_is_built_of_is_refused_and_leaves_nothing() {
+        let parent = std::env::temp_dir().join(format!("tropism-new-{}", std::process::id()));
+        let new = |name| NewMechanism {
+            name,
+            parent: &parent,
+            sources: Some(env!("CARGO_MANIFEST_DIR").as_ref()),
+            taken: &[],
+        };
+        let refusal = new("bevy_ecs").write().unwrap_err().to_string();
+        assert!(refusal.contains("tropism depends on a crate of this name"), "{refusal}");
+        assert!(!parent.exists());
     }
 
     #[test]

@@ -23,8 +23,8 @@ use std::collections::{BTreeMap, BTreeSet};
 keys! {
     /// Shafts that adhere where they cross; dy/dt = (S − 2T(1 − cos β/2))/(2η_e(cos β/2 − 1)²/L + η_Z).
     pub struct Zippering {
-        /// Tension T of a shaft.
-        #[schemars(extend("exclusiveMinimum" = 0.0, "x-typical" = [200.0, 2000.0]))]
+        /// Tension T of a shaft. At most 100 nN, ours: a zipper point moves in time steps of L η_Z/(4T).
+        #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1e5, "x-typical" = [200.0, 2000.0]))]
         pub tension: Force = Force(679.0),
         /// Force S with which two shafts adhere.
         #[schemars(extend("minimum" = 0.0, "x-typical" = [0.0, 200.0]))]

@@ -278,6 +278,34 @@ fn names_that_do_not_exist_in_the_scene_are_refused_with_those_that_do() {
 }
 
 #[test]
+fn who_names_a_mechanism_that_is_not_there_learns_of_all_that_are() {
+    let said = refusal(&scene(), &["--without", "nope"]);
+    assert!(said.contains("--without nope: no such mechanism (mechanisms: matrix, cues, "), "{said}");
+    let output = tropism(&Folder::new(), &["mechanisms", "nope"]);
+    assert_eq!(code(&output), 2);
+    let said = errors(&output);
+    assert!(said.contains("there is no mechanism `nope` (there are: matrix, ") && said.contains("zippering"), "{said}");
+}
+
+#[test]
+fn what_cones_release_has_a_name_of_its_own() {
+    let mut scene = scene();
+    scene["cone_release"] = json!({ "cues": { "attractant": { "effect": "attract" } } });
+    let said = refusal(&scene, &[]);
+    assert!(said.contains("/cone_release/cues/attractant: the scene has a cue `attractant` already"), "{said}");
+}
+
+#[test]
+#[cfg(unix)]
+fn a_pipe_with_a_name_is_no_scenario() {
+    let folder = Folder::new();
+    assert!(Command::new("mkfifo").arg(folder.0.join("pipe.json")).status().unwrap().success());
+    let output = tropism(&folder, &["pipe.json"]);
+    assert!(errors(&output).contains("pipe.json: no file to be read from its beginning to its end"));
+    assert_eq!(code(&output), 2);
+}
+
+#[test]
 fn results_that_cannot_be_written_end_with_one() {
     let folder = with_scene(&scene());
     folder.write("in_the_way", "");

@@ -129,6 +129,31 @@ fn the_lengths_of_trees_are_those_of_the_summary_and_single_points_are_listed() 
 }
 
 #[test]
+#[cfg(unix)]
+fn trees_of_an_earlier_run_go_and_a_link_is_not_followed() {
+    let folder = with_scene(&scene());
+    let swc =
+        |interval: &str| run(&folder, &["--out", "out", "--set", &format!("/output/swc={{\"interval\": {interval}}}")]);
+    swc("0.5");
+    std::fs::write(folder.0.join("out/swc/0007/mine.txt"), "mine").unwrap();
+    swc("3");
+    assert_eq!(names(folder.0.join("out/swc")), ["0000", "0001", "0002", "0007"]);
+    assert_eq!(names(folder.0.join("out/swc/0007")), ["mine.txt"], "what is not ours stays");
+    std::fs::remove_dir_all(folder.0.join("out")).unwrap();
+    std::fs::create_dir_all(folder.0.join("out")).unwrap();
+    std::fs::create_dir_all(folder.0.join("elsewhere")).unwrap();
+    std::os::unix::fs::symlink(folder.0.join("elsewhere"), folder.0.join("out/swc")).unwrap();
+    let output = tropism(&folder, &["scene.json", "--out", "out", "--set", "/output/swc={}"]);
+    assert_eq!(output.status.code(), Some(1));
+    assert!(
+        errors(&output).contains("out/swc: it is a link; a run writes into folders of its own"),
+        "{}",
+        errors(&output)
+    );
+    assert!(names(folder.0.join("elsewhere")).is_empty());
+}
+
+#[test]
 fn sweeps_write_little_and_the_plan_names_what_a_run_writes() {
     let folder = with_scene(&scene());
     run(&folder, &[&ALL[..], &["--seeds", "2"]].concat());

@@ -213,6 +213,21 @@ fn a_signal_finishes_the_step_writes_what_there_is_and_says_so() {
 }
 
 #[test]
+fn a_command_that_writes_at_its_end_says_that_it_was_stopped() {
+    let folder = Folder::new();
+    let mut command = Command::new(env!("CARGO_BIN_EXE_tropism"));
+    let mut child =
+        command.args(["stability", "--out", "maps"]).current_dir(&folder.0).stderr(Stdio::piped()).spawn().unwrap();
+    while !folder.0.join("maps").exists() && child.try_wait().unwrap().is_none() {
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
+    let output = child.wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(130), "{}", words(&output));
+    assert!(words(&output).contains("stopped by SIGINT: what this command had not written by now is not there"));
+}
+
+#[test]
 fn a_run_without_checkpoints_can_be_stopped_and_resumed_too_and_seeds_end_clean() {
     let folder = Folder::new();
     let mut long = scene();

@@ -111,6 +111,26 @@ impl Drop for Scenes {
 fn each_bad_value_gets_its_own_sentence() {
     let cases = [
         (
+            r#"{"growth": {"turning_rate": 1e308}}"#,
+            "/growth/turning_rate: 1e308 is no number of a model: 0, or 1e-30 to 1e30 /h in size",
+        ),
+        (
+            r#"{"tissue": {"mesh_size": 1e-200}}"#,
+            "/tissue/mesh_size: 1e-200 is no number of a model: 0, or 1e-30 to 1e30 um in size",
+        ),
+        (
+            r#"{"time": {"method": "bogacki_shampine", "tolerance": 1e-20}}"#,
+            "/time/tolerance: 1e-20 is outside what is possible: tolerance ≥ 1e-12 um",
+        ),
+        (
+            r#"{"name": "a\u0007b"}"#,
+            "/name: \"a\\u{7}b…\" is no name: at most 100 signs, none of them a control sign such as a line's end",
+        ),
+        (
+            r#"{"targets": {"a\u0007b": {"disc": {"centre": [10, 10], "radius": 5}}}}"#,
+            "/targets/a\\u{7}b: \"a\\u{7}b…\" is no name: at most 100 signs, none of them a control sign such as a line's end",
+        ),
+        (
             r#"{"time": {"stepp": 1}}"#,
             "/time/stepp: unknown key; did you mean `step`? (keys here: duration, step, method, tolerance)",
         ),

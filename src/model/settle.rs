@@ -27,7 +27,19 @@ pub fn settle(
         if !(spring.is_finite() && position.0.sum().is_finite() && at.sum().is_finite()) {
             health.report(
                 time,
-                format!("growth cone of axon {} has a state that is not finite: {spring:?} at {position:?}", cone.axon),
+                format!(
+                    "growth cone of axon {} has a state that is not finite: at ({:.3}, {:.3}) um, heading ({:.3}, {:.3}), pull ({:.3e}, {:.3e}), \
+                     speed factor {:.3e}, heading diffusion {:.3e} /h; a mechanism adds more than numbers hold",
+                    cone.axon,
+                    position.0.x,
+                    position.0.y,
+                    spring.heading.x,
+                    spring.heading.y,
+                    spring.pull.x,
+                    spring.pull.y,
+                    spring.speed_factor,
+                    spring.heading_diffusion
+                ),
             );
             return;
         }

@@ -4,8 +4,8 @@ use super::components::Site;
 use super::shape::Shape;
 use crate::numerics::locate::SeedGrid;
 use crate::numerics::mesh_grading::Grading;
+use crate::numerics::nearest_side::NearestSide;
 use crate::numerics::planar_domain::PlanarDomain;
-use crate::numerics::polygon::{nearest_on_side, sides};
 use crate::numerics::simplex_mesh::{BorderFacet, SimplexMesh};
 use crate::numerics::triangulate::{FittedMesh, MeshOptions, TriangulationError, triangulate_graded};
 use bevy_ecs::prelude::Resource;
@@ -51,8 +51,9 @@ impl Tissue {
                 list.push(*facet);
             }
         }
+        let outline = NearestSide::of(&domain);
         for list in &mut edges {
-            order_along(&domain, &mesh, list);
+            order_along(&outline, &mesh, list);
         }
         let seeds = SeedGrid::new(&mesh, mesh.vertices());
         Ok(Self { domain, mesh: Arc::new(mesh), regions, edges, options, inputs: inputs.into(), seeds })
@@ -75,23 +76,17 @@ impl Tissue {
 }
 
 /// Sorts the facets of an edge by where they lie along the rings of the outline.
-fn order_along(domain: &PlanarDomain, mesh: &SimplexMesh<2>, facets: &mut [BorderFacet]) {
-    let sides: Vec<_> = domain.rings().flat_map(|ring| sides(&ring.points)).collect();
-    let place = |facet: &BorderFacet| {
-        let ends: Vec<_> = mesh.facet_vertices(*facet).map(|v| mesh.vertices()[v as usize]).collect();
+fn order_along(outline: &NearestSide, mesh: &SimplexMesh<2>, facets: &mut Vec<BorderFacet>) {
+    let place = |facet: BorderFacet| {
+        let ends: Vec<_> = mesh.facet_vertices(facet).map(|v| mesh.vertices()[v as usize]).collect();
         let middle = [0.5 * (ends[0][0] + ends[1][0]), 0.5 * (ends[0][1] + ends[1][1])];
-        let nearest = |a: &usize, b: &usize| {
-            let distance = |i: usize| nearest_on_side(sides[i], middle).distance;
-            distance(*a).total_cmp(&distance(*b))
-        };
-        let side = (0..sides.len()).min_by(nearest).unwrap_or_default();
-        let start = sides[side][0];
-        (side, (middle[0] - start[0]).hypot(middle[1] - start[1]))
+        let side = outline.place(middle).unwrap_or_default();
+        let start = outline.side(side)[0];
+        ((side, (middle[0] - start[0]).hypot(middle[1] - start[1])), facet)
     };
-    facets.sort_by(|a, b| {
-        let (a, b) = (place(a), place(b));
-        a.0.cmp(&b.0).then(a.1.total_cmp(&b.1))
-    });
+    let mut placed: Vec<_> = facets.drain(..).map(place).collect();
+    placed.sort_by(|(a, _), (b, _)| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
+    facets.extend(placed.into_iter().map(|(_, facet)| facet));
 }
 
 /// A planar point as a 3-vector with z exactly 0.

@@ -1,7 +1,7 @@
 //! What a check of a block found wrong: a place inside the block and a sentence. A check collects every violation and returns
 //! them together, so that an author corrects a scene once.
 
-use std::fmt;
+use std::fmt::{self, Write};
 
 use thiserror::Error;
 
@@ -79,7 +79,14 @@ impl fmt::Display for Violation {
         if self.pointer.is_empty() {
             return formatter.write_str(&self.message);
         }
-        write!(formatter, "{}: {}", self.pointer, self.message)
+        // A name with control signs is told as it is written in JSON, and does nothing to a terminal.
+        for sign in self.pointer.chars() {
+            match sign.is_control() {
+                true => write!(formatter, "{}", sign.escape_unicode())?,
+                false => formatter.write_char(sign)?,
+            }
+        }
+        write!(formatter, ": {}", self.message)
     }
 }
 

@@ -22,6 +22,7 @@ pub mod load_path;
 pub mod locate;
 pub mod material;
 pub mod mesh_grading;
+pub mod nearest_side;
 pub mod newton;
 pub mod ogden;
 pub mod piecewise;

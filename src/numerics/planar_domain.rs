@@ -307,20 +307,6 @@ impl PlanarDomain {
         }
         best
     }
-
-    /// Edge of the side that lies nearest to a point (µm); the first side wins a tie.
-    pub fn edge_at(&self, point: [f64; 2]) -> u16 {
-        let mut best = (f64::INFINITY, 0);
-        for ring in self.rings() {
-            for (side, &edge) in sides(&ring.points).zip(&ring.edges) {
-                let away = nearest_on_side(side, point).distance;
-                if away < best.0 {
-                    best = (away, edge);
-                }
-            }
-        }
-        best.1
-    }
 }
 
 fn check_ring(points: &[[f64; 2]], name: &str) -> Result<(), DomainError> {
@@ -345,6 +331,7 @@ fn check_ring(points: &[[f64; 2]], name: &str) -> Result<(), DomainError> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::numerics::nearest_side::NearestSide;
     use crate::numerics::polygon::{dot, minus};
 
     fn named(points: &[[f64; 2]]) -> Ring {
@@ -376,7 +363,7 @@ mod tests {
         let domain = PlanarDomain::new(clockwise, Vec::new(), names);
         assert!(signed_area(&domain.outer.points) > 0.0);
         for (point, edge) in [([1.0, 0.1], 0), ([1.9, 0.5], 1), ([1.0, 0.9], 2), ([0.1, 0.5], 3)] {
-            assert_eq!(domain.edge_at(point), edge);
+            assert_eq!(NearestSide::of(&domain).edge_at(point), edge);
             let nearest = domain.nearest_on_edge(edge, point).unwrap();
             assert!((nearest.distance - 0.1).abs() < 1e-15);
             let inward = minus(point, nearest.point);

@@ -13,6 +13,7 @@ use spade::{AngleLimit, ConstrainedDelaunayTriangulation, Point2, RefinementPara
 use crate::numerics::arrangement::Arrangement;
 use crate::numerics::lattice::filling;
 use crate::numerics::mesh_grading::Grading;
+use crate::numerics::nearest_side::NearestSide;
 use crate::numerics::planar_domain::{DomainError, Outline, PlanarDomain};
 use crate::numerics::polygon::{MERGE_TOLERANCE, bounding_box, cross, dot, minus, nearest_on_side, sides, signed_area};
 use crate::numerics::simplex_mesh::{MeshError, SimplexMesh};
@@ -139,7 +140,8 @@ pub fn triangulate_graded(
     let (vertices, triangles) = refined_triangles(domain, (&constraints, outlines), options, grading)?;
     let (vertices, cells) = kept_and_renumbered(domain, &vertices, &triangles);
     let mut mesh = SimplexMesh::new(vertices, cells)?;
-    mesh.name_border(|midpoint| domain.edge_at(midpoint));
+    let outline = NearestSide::of(domain);
+    mesh.name_border(|midpoint| outline.edge_at(midpoint));
     let regions = regions(&mesh, outlines)?;
     let min_angle = smallest_angle(&mesh, mesh.vertices());
     Ok(FittedMesh { mesh, regions, min_angle })

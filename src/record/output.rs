@@ -140,6 +140,39 @@ pub fn clear_folder(folder: &Path, ending: &str) -> Result<(), WriteError> {
     clear().map_err(|source| WriteError { path: folder.to_owned(), source })
 }
 
+/// Refuses a link in the place of a folder of results' own: what is written there would land elsewhere.
+///
+/// # Errors
+/// The path.
+pub fn no_link(folder: &Path) -> Result<(), WriteError> {
+    match folder.symlink_metadata() {
+        Ok(found) if found.is_symlink() => {
+            let source =
+                io::Error::new(io::ErrorKind::NotADirectory, "it is a link; a run writes into folders of its own");
+            Err(WriteError { path: folder.to_owned(), source })
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Removes the files of one ending that an earlier run left in numbered folders within a folder, and such folders as are empty then.
+///
+/// # Errors
+/// The path and the system's reason.
+pub fn clear_numbered(folder: &Path, ending: &str) -> Result<(), WriteError> {
+    let numbered = |entry: &fs::DirEntry| {
+        let is_number = entry.file_name().to_str().is_some_and(|name| name.len() >= 4 && name.parse::<u32>().is_ok());
+        is_number && entry.file_type().is_ok_and(|kind| kind.is_dir())
+    };
+    let Ok(entries) = fs::read_dir(folder) else { return Ok(()) };
+    for entry in entries.flatten().filter(numbered) {
+        clear_folder(&entry.path(), ending)?;
+        // It stays if somebody else has put something there.
+        let _ = fs::remove_dir(entry.path());
+    }
+    Ok(())
+}
+
 /// Makes a folder for results and tries to write into it, so that a long run does not end in one that cannot be written.
 ///
 /// # Errors

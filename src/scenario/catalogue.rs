@@ -7,7 +7,7 @@ use serde_json::Value;
 use super::ranges::{Range, typical, with_unit};
 use super::schema::{BlockSchema, full_schema};
 use super::schema_view::{branches_of, describe, kind_of, resolve, types_of, unescaped, words_of};
-use super::suggest::advice;
+use super::suggest::full_advice;
 use crate::model::quantity::format_number;
 
 /// Keys inside keys are listed this deep.
@@ -82,7 +82,7 @@ impl Catalogue {
         let mut names: Vec<&str> = self.mechanisms.iter().map(|block| block.name.as_str()).collect();
         names.push(SCENE);
         if !names.contains(&name) {
-            return Err(format!("there is no mechanism `{name}`{}", advice(name, "there are", &names, '`')));
+            return Err(format!("there is no mechanism `{name}`{}", full_advice(name, "there are", &names, '`')));
         }
         self.mechanisms.retain(|block| block.name == name);
         self.scene = self.scene.filter(|_| name == SCENE);

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeSet;
 
+use super::names::{is_name, no_name};
 use super::scene::{Births, Direction, Heading, Method, Origin, Outline, Population, Ring, Scene, Tissue};
 use super::suggest::advice;
 use crate::model::quantity::{Time, format_number};
@@ -29,6 +30,7 @@ impl Scene {
     pub fn check_except(&self, broken: &BTreeSet<String>) -> Result<(), Violations> {
         let sound = |names: &[&str]| !names.iter().any(|name| broken.contains(*name));
         let mut violations = Violations::new();
+        violations.demand(is_name(&self.name) || !sound(&["name"]), "/name", || no_name(&self.name));
         let nameable = !self.name.contains(['/', '\\', '\0']) && ![".", ".."].contains(&self.name.as_str());
         violations.demand(nameable || !sound(&["name"]), "/name", || {
             format!("\"{}\" cannot be the name of a directory of results", self.name)

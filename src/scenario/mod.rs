@@ -15,6 +15,7 @@ mod files;
 mod folder;
 pub mod load;
 pub mod merge;
+mod names;
 pub mod outline_file;
 pub mod overrides;
 mod population;

@@ -3,7 +3,7 @@
 use serde_json::{Map, Value};
 
 use super::read;
-use super::suggest::advice;
+use super::suggest::full_advice;
 use crate::model::violation::Violation;
 
 /// Pointers of `--set` may have this many tokens.
@@ -19,7 +19,7 @@ pub fn remove_blocks(
 ) {
     for name in without {
         if !names.contains(&name.as_str()) {
-            let message = format!("--without {name}: no such mechanism{}", advice(name, "mechanisms", names, '`'));
+            let message = format!("--without {name}: no such mechanism{}", full_advice(name, "mechanisms", names, '`'));
             problems.push(Violation::new("", message));
             continue;
         }

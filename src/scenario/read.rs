@@ -29,6 +29,12 @@ pub enum ReadError {
         /// The path.
         path: PathBuf,
     },
+    /// The path is a pipe or a device.
+    #[error("{}: no file to be read from its beginning to its end", path.display())]
+    NoFile {
+        /// The path.
+        path: PathBuf,
+    },
     /// The system refused to read.
     #[error("{}: cannot be read: {source}", path.display())]
     Unreadable {
@@ -84,6 +90,13 @@ pub fn read_text(path: &Path) -> Result<String, ReadError> {
     };
     if path.is_dir() {
         return Err(ReadError::Directory { path: owned() });
+    }
+    // A pipe with a name may keep the reader waiting for ever; one that a shell hands over, as in `<(…)`, has its writer.
+    if std::fs::metadata(path).is_ok_and(|data| !data.is_file())
+        && !path.starts_with("/dev")
+        && !path.starts_with("/proc")
+    {
+        return Err(ReadError::NoFile { path: owned() });
     }
     let mut bytes = Vec::new();
     let file = File::open(path).map_err(unreadable)?;

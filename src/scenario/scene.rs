@@ -63,7 +63,7 @@ keys! {
         /// The integrator of the turning law.
         pub method: Method = Method::Rotation,
         /// The largest error of a cone's step of `bogacki_shampine`, 0.01 um by default; no other method takes it.
-        #[schemars(extend("exclusiveMinimum" = 0.0, "x-typical" = [1e-6, 1.0]))]
+        #[schemars(extend("minimum" = 1e-12, "x-typical" = [1e-6, 1.0]))]
         pub tolerance: Option<Length> = None,
     }
 

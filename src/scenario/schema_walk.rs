@@ -5,7 +5,9 @@
 //! An object member that is `null` is absent: it may name any known key, and no unknown one.
 
 use serde_json::{Map, Value};
+use std::ops::RangeInclusive;
 
+use super::names::{is_name, no_name};
 use super::ranges::{Range, typical, with_unit};
 use super::schema_view::{
     branches_of, collect_keys, describe, example_of, fits_format, has_type, kind_of, quoted, refusal, resolve, show,
@@ -14,6 +16,10 @@ use super::schema_view::{
 use super::suggest::{advice, nearest};
 use crate::model::quantity::{Kind, with_article};
 use crate::model::violation::{Violation, pointer_token};
+
+/// Sizes, in base units, that a number of a model may have if it is not 0: what lies beyond is a slip, and ends in sums that no number
+/// holds. Ours.
+const MODEL_NUMBERS: RangeInclusive<f64> = 1e-30..=1e30;
 
 /// What a walk found.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -110,6 +116,10 @@ impl<'a> Walker<'a> {
             let allowed = range.describe(name, kind);
             return self.problem(pointer, format!("{shown} is outside what is possible: {allowed}"));
         }
+        if number != 0.0 && !MODEL_NUMBERS.contains(&number.abs()) {
+            let (least, most) = (with_unit(*MODEL_NUMBERS.start(), None), with_unit(*MODEL_NUMBERS.end(), kind));
+            return self.problem(pointer, format!("{shown} is no number of a model: 0, or {least} to {most} in size"));
+        }
         let Some((low, high)) = typical(schema) else { return };
         if !(low..=high).contains(&number) {
             let usual = format!("{} to {}", with_unit(low, None), with_unit(high, kind));
@@ -132,7 +142,9 @@ impl<'a> Walker<'a> {
         for (key, member) in object {
             let place = format!("{pointer}{}", pointer_token(key));
             let property = properties.and_then(|all| all.get(key)).or(others);
+            let is_free = properties.is_none_or(|all| !all.contains_key(key)) && others.is_some();
             match property {
+                _ if is_free && !is_name(key) => self.problem(&place, no_name(key)),
                 _ if member.is_null() && (property.is_some() || known.is_none()) => {}
                 Some(property) => self.check(property, member, &place),
                 None => {

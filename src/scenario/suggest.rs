@@ -21,13 +21,23 @@ pub fn nearest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) ->
 /// `; did you mean X?` and, when short enough, ` (what: a, b, c)`: the tail of a message about an unknown name. `quote` is put
 /// around the suggestion.
 pub fn advice(name: &str, what: &str, candidates: &[&str], quote: char) -> String {
-    let suggestion = nearest(name, candidates.iter().copied());
-    let mut tail = suggestion.map_or_else(String::new, |near| format!("; did you mean {quote}{near}{quote}?"));
     let list = candidates.join(", ");
-    if list.chars().count() <= LISTED_CHARACTERS {
-        tail.push_str(&format!(" ({what}: {})", if list.is_empty() { "none" } else { &list }));
-    }
-    tail
+    let listed = list.chars().count() <= LISTED_CHARACTERS;
+    did_you_mean(name, candidates, quote) + &if listed { all_of(what, &list) } else { String::new() }
+}
+
+/// The same with the whole list, however long.
+pub fn full_advice(name: &str, what: &str, candidates: &[&str], quote: char) -> String {
+    did_you_mean(name, candidates, quote) + &all_of(what, &candidates.join(", "))
+}
+
+fn did_you_mean(name: &str, candidates: &[&str], quote: char) -> String {
+    let near = nearest(name, candidates.iter().copied());
+    near.map_or_else(String::new, |near| format!("; did you mean {quote}{near}{quote}?"))
+}
+
+fn all_of(what: &str, list: &str) -> String {
+    format!(" ({what}: {})", if list.is_empty() { "none" } else { list })
 }
 
 #[cfg(test)]
@@ -50,5 +60,7 @@ mod tests {
         assert_eq!(advice("stp", "keys here", &["step", "end"], '`'), "; did you mean `step`? (keys here: step, end)");
         let long = ["a_rather_long_name_of_a_key"; 20];
         assert_eq!(advice("zzz", "keys here", &long, '`'), "");
+        let full = full_advice("zzz", "there are", &long, '`');
+        assert!(full.starts_with(" (there are: a_rather_long") && full.len() > 500, "unless all are asked for");
     }
 }

@@ -260,7 +260,9 @@ impl Run {
             if let Err(fault) = simulation.step() {
                 return Ok(Ended::Fault(fault));
             }
-            if let Some(account) = between(self) {
+            let stopped = between(self);
+            self.simulation.lap("record");
+            if let Some(account) = stopped {
                 return Ok(Ended::Stopped(Fault { time: self.simulation.time(), account }));
             }
         }

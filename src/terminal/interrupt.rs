@@ -1,7 +1,9 @@
 //! Ctrl-C and the scheduler's signal: the first ends the run after its step, a second one ends the program at once.
 
+use super::voice::alarm;
 use signal_hook::consts::{SIGINT, SIGTERM};
 use signal_hook::flag;
+use signal_hook::iterator::Signals;
 use std::io;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
@@ -38,10 +40,31 @@ impl Interrupt {
 
     /// The signal that has come, if one has.
     pub fn caught(&self) -> Option<Signal> {
-        match self.0.load(Ordering::Relaxed) as i32 {
-            SIGINT => Some(Signal { name: "SIGINT", code: 130 }),
-            SIGTERM => Some(Signal { name: "SIGTERM", code: 143 }),
+        Signal::of(self.0.load(Ordering::Relaxed) as i32)
+    }
+}
+
+impl Signal {
+    fn of(number: i32) -> Option<Self> {
+        match number {
+            SIGINT => Some(Self { name: "SIGINT", code: 130 }),
+            SIGTERM => Some(Self { name: "SIGTERM", code: 143 }),
             _ => None,
         }
     }
+}
+
+/// Ends the program at the first signal, and says so: for a command whose results are written at its end.
+///
+/// # Errors
+/// The system's reason.
+pub fn end_at_once() -> io::Result<()> {
+    let mut signals = Signals::new([SIGINT, SIGTERM])?;
+    std::thread::spawn(move || {
+        if let Some(signal) = signals.forever().find_map(Signal::of) {
+            alarm!("stopped by {}: what this command had not written by now is not there", signal.name);
+            std::process::exit(signal.code.into());
+        }
+    });
+    Ok(())
 }

@@ -33,6 +33,7 @@ use commands::{
     run_stability,
 };
 use examples::words;
+use interrupt::end_at_once;
 use manners::{alarming, completions, drawn, man_page};
 use running::{resume, run_once};
 use std::ffi::OsString;
@@ -94,6 +95,13 @@ fn on_threads<T: Send>(cli: &Cli, work: impl FnOnce() -> Result<T, RunError> + S
 }
 
 fn execute(cli: &Cli, roster: &Roster) -> Result<ExitCode, RunError> {
+    let writes_at_its_end = matches!(
+        &cli.command,
+        Some(Command::Chart { .. } | Command::Bench { .. } | Command::Movie(_) | Command::Stability { .. })
+    );
+    if writes_at_its_end {
+        end_at_once().map_err(|error| RunError::Internal(error.to_string()))?;
+    }
     match &cli.command {
         Some(Command::Plan { scene, json, .. }) => return run_plan(scene, *json, roster),
         Some(Command::Ablate { scene, out, seeds, pairs, .. }) => {

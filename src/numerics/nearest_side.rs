@@ -50,11 +50,14 @@ impl NearestSide {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::numerics::planar_domain::Ring;
+    use crate::numerics::planar_domain::{Outline, Ring};
 
     #[test]
     fn it_is_the_one_that_looking_at_all_sides_finds_and_the_first_of_two_as_near() {
-        let disc = |radius: f64, side: f64| Ring::disc([3.0, -2.0], radius, side);
+        let disc = |radius: f64, side: f64| {
+            let points = Outline::disc([3.0, -2.0], radius, side).points;
+            Ring { edges: vec![0; points.len()], points }
+        };
         let domain = PlanarDomain::new(disc(50.0, 1.5), vec![disc(20.0, 2.5)], vec!["wall".into()]);
         let nearest = NearestSide::of(&domain);
         let all: Vec<_> = domain.rings().flat_map(|ring| sides(&ring.points)).collect();

@@ -16,7 +16,6 @@
 //! are those of the stage, so the order of the integrator is kept; sums are taken in the order of the cones' numbers.
 
 use super::cue_fields::Cues;
-use crate::model::violation::pointer_token;
 use crate::numerics::bessel::{decaying, growing};
 use crate::prelude::*;
 use rayon::prelude::*;
@@ -101,10 +100,6 @@ impl Mechanism for ConeRelease {
             "name what cones release, such as {\"attractant\": {\"effect\": \"attract\"}}".into()
         });
         for (name, cue) in &self.cues {
-            let taken = facts.names_in(Cues::NAME).contains(name);
-            wrong.demand(!taken, &format!("/cues{}", pointer_token(name)), || {
-                format!("the scene has a cue `{name}` already; what cones release has a name of its own")
-            });
             if let Some(activation) = &cue.activated_by {
                 Cues::demand_known(facts, &mut wrong, &activation.cue, &format!("/cues/{name}/activated_by/cue"));
             }

@@ -87,7 +87,7 @@ fn the_accuracy_is_reached_in_a_stretched_tissue() {
     assert!(error > 0.0 && error <= 0.002, "{error}");
     let loaded = found(&stretched(0.002), &systems::standard());
     let coarser = number(&loaded, "/matrix/mesh_size") / number(&loaded, "/tissue/mesh_size");
-    assert!(coarser == 2.0 || coarser == 4.0, "the matrix is smooth enough for a mesh of its own: {coarser}");
+    assert!(coarser > 1.0 && coarser <= 8.0, "the matrix is smooth enough for a mesh of its own: {coarser}");
 }
 
 #[test]
@@ -103,7 +103,7 @@ fn keys_that_are_given_are_kept_and_those_found_are_told() {
     assert_eq!(loaded.scene.time.step.0, 0.05);
     assert_eq!(loaded.scene.accuracy, None);
     let mesh = loaded.scene.tissue.mesh_size.0;
-    assert!(mesh > 1.0 && mesh <= 25.0, "{mesh}");
+    assert!(mesh > 1.0 && mesh <= 50.0, "{mesh}");
     let note = &loaded.remarks[0];
     assert!(note.contains("accuracy 0.02") && note.contains("/tissue/mesh_size="), "{note}");
     let manifest = Manifest::of(&loaded);

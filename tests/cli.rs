@@ -288,14 +288,6 @@ fn who_names_a_mechanism_that_is_not_there_learns_of_all_that_are() {
 }
 
 #[test]
-fn what_cones_release_has_a_name_of_its_own() {
-    let mut scene = scene();
-    scene["cone_release"] = json!({ "cues": { "attractant": { "effect": "attract" } } });
-    let said = refusal(&scene, &[]);
-    assert!(said.contains("/cone_release/cues/attractant: the scene has a cue `attractant` already"), "{said}");
-}
-
-#[test]
 #[cfg(unix)]
 fn a_pipe_with_a_name_is_no_scenario() {
     let folder = Folder::new();

@@ -112,15 +112,15 @@ fn each_bad_value_gets_its_own_sentence() {
     let cases = [
         (
             r#"{"growth": {"turning_rate": 1e308}}"#,
-            "/growth/turning_rate: 1e308 is no number of a model: 0, or 1e-30 to 1e30 /h in size",
+            "/growth/turning_rate: 1e308 /h is no number of a model: 0, or 1e-30 to 1e30 /h in size",
         ),
         (
             r#"{"tissue": {"mesh_size": 1e-200}}"#,
-            "/tissue/mesh_size: 1e-200 is no number of a model: 0, or 1e-30 to 1e30 um in size",
+            "/tissue/mesh_size: 1e-200 um is no number of a model: 0, or 1e-30 to 1e30 um in size",
         ),
         (
             r#"{"time": {"method": "bogacki_shampine", "tolerance": 1e-20}}"#,
-            "/time/tolerance: 1e-20 is outside what is possible: tolerance ≥ 1e-12 um",
+            "/time/tolerance: 1e-20 um is outside what is possible: tolerance ≥ 1e-12 um",
         ),
         (
             r#"{"name": "a\u0007b"}"#,
@@ -212,7 +212,7 @@ fn each_bad_value_gets_its_own_sentence() {
         ),
         (
             r#"{"time": {"method": "bogacki_shampine", "tolerance": 0}}"#,
-            "/time/tolerance: 0 um is outside what is possible: tolerance > 0 um",
+            "/time/tolerance: 0 um is outside what is possible: tolerance ≥ 1e-12 um",
         ),
         (
             r#"{"populations": {"a": {"heading": "inner_norml"}}}"#,

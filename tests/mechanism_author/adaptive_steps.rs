@@ -302,8 +302,8 @@ fn the_noise_is_no_error_and_a_finer_tolerance_meets_the_same_brownian_path() {
 
 #[test]
 fn a_jump_that_no_step_resolves_is_crossed_and_noted() {
-    let mut scene = front(PAIR, 1e-4, Some(1e-14));
-    scene["time"]["duration"] = json!(1e-4);
+    let mut scene = front(PAIR, 1e-2, Some(1e-12));
+    scene["time"]["duration"] = json!(1e-2);
     scene["front"] = json!({ "width": 0, "height": 40.0005 });
     let simulation = ended(&scene, &roster());
     let notes = simulation.world().resource::<Health>().notes().join("; ");

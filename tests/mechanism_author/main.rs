@@ -142,20 +142,33 @@ fn a_program_of_its_own_is_one_call() {
     );
 }
 
+/// A law that divides by nothing.
+#[derive(Debug, Default, Deserialize, JsonSchema)]
+struct Boundless {}
+
+impl Mechanism for Boundless {
+    const NAME: &'static str = "boundless";
+
+    fn install(self, model: &mut ModelBuilder) -> Result<(), InstallError> {
+        model.term(Term::Turn, |mut cones: Cones| cones.for_each(|_, spring| spring.pull.x = f64::INFINITY));
+        Ok(())
+    }
+}
+
 #[test]
 fn a_pull_that_is_not_finite_ends_the_run_with_one_and_keeps_what_there_is() {
     let folder = Folder::new();
     let mut scene = field_alone("rotation", 120.0, 0.0, 0.1);
-    scene["galvanotaxis"] = json!({ "field": 1e308, "weight": 4 });
+    scene["boundless"] = json!({});
     let path = folder.write("scene.json", &scene.to_string());
     let out = folder.0.join("out");
     let arguments = ["galvanotaxis".as_ref(), path.as_os_str(), "--out".as_ref(), out.as_os_str()];
-    let code = format!("{:?}", tropism::run(arguments, roster()));
+    let code = format!("{:?}", tropism::run(arguments, roster().with::<Boundless>()));
     assert_eq!(code, format!("{:?}", std::process::ExitCode::from(1)));
     let summary: Value = serde_json::from_str(&std::fs::read_to_string(out.join("summary.json")).unwrap()).unwrap();
     assert_eq!(summary["complete"], json!(false));
     let fault = summary["fault"].as_str().unwrap();
-    assert!(fault.starts_with("at t = ") && fault.contains("finite"), "{fault}");
+    assert!(fault.starts_with("at t = ") && fault.contains("finite") && fault.contains("pull (inf, "), "{fault}");
     assert!(out.join("trajectories.csv").exists() && out.join("figure.png").exists());
 }
 

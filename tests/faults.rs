@@ -325,3 +325,12 @@ fn a_closed_standard_error_is_no_fault_either() {
         .unwrap();
     assert!(matches!(status.code(), Some(0 | 2)), "{status}");
 }
+
+#[test]
+fn a_crate_that_does_not_fit_on_the_disk_is_not_left_by_halves() {
+    let Some((folder, tiny)) = Tiny::mount("size=48k") else { return };
+    let (sources, place) = (env!("CARGO_MANIFEST_DIR"), tiny.0.to_str().unwrap());
+    let (code, words) = tropism(&folder, &["new-mechanism", "drift", "--path", place, "--tropism", sources]);
+    assert!(code == 1 && words.contains("No space left on device"), "{words}");
+    assert_eq!(std::fs::read_dir(&tiny.0).unwrap().count(), 0, "{words}");
+}

@@ -150,6 +150,9 @@ fn trees_of_an_earlier_run_go_and_a_link_is_not_followed() {
         "{}",
         errors(&output)
     );
+    std::os::unix::fs::symlink(folder.0.join("elsewhere"), folder.0.join("out/vtu")).unwrap();
+    let output = tropism(&folder, &["scene.json", "--out", "out", "--set", "/output/vtu={\"tissue\": {}}"]);
+    assert!(errors(&output).contains("out/vtu: it is a link"), "{}", errors(&output));
     assert!(names(folder.0.join("elsewhere")).is_empty());
 }
 

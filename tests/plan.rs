@@ -280,3 +280,17 @@ fn a_limit_that_is_passed_is_marked_and_noted() {
     let part = pair.plan.parts.iter().find(|part| part.name == "adaptive steps").unwrap();
     assert!(part.kept && part.why.contains("within 0.001 um"), "{}", part.why);
 }
+
+#[test]
+fn a_short_interval_gives_no_more_rows_than_there_are_steps() {
+    let rows = |interval: Value| {
+        let plan = unguided(|scene| scene["output"] = json!({ "trajectory_interval": interval }));
+        part(&plan.memory_mb, "trajectories")
+    };
+    let each_step = rows(json!("4 min"));
+    assert!(each_step > 0.0);
+    for short in ["1 s", "1e-9 s"] {
+        assert_eq!(rows(json!(short)), each_step, "{short}");
+    }
+    assert!(rows(json!(1)) < each_step);
+}

@@ -1,6 +1,6 @@
 //! Series of VTU files, one an instant, with a PVD that says which belongs to which time (h).
 
-use super::super::output::{WriteError, clear_folder, write_atomically};
+use super::super::output::{WriteError, clear_folder, no_link, write_atomically};
 use super::vtu::{CellKind, Grid, Values, escaped};
 use super::{Output, OutputError};
 use crate::model::clock::Clock;
@@ -31,6 +31,8 @@ impl VtuSeries {
     /// # Errors
     /// The path and the system's reason.
     pub fn create(folder: &Path, name: &'static str, grid: View) -> Result<Self, OutputError> {
+        no_link(&folder.join("vtu"))?;
+        no_link(&folder.join("vtu").join(name))?;
         Ok(Self { folder: folder.join("vtu"), name, grid, times: Vec::new() })
     }
 

@@ -83,22 +83,24 @@ fn bound_edges(tissue: Res<Tissue>, configuration: Res<Configuration>, mut boxes
         return;
     }
     boxes.holds = Some(holds);
-    let bounds = |facets: &[BorderFacet]| bounding_box(&tissue, &configuration, facets);
-    let of_edge =
-        |facets: &Vec<BorderFacet>| EdgeBox { whole: bounds(facets), runs: facets.chunks(RUN).map(bounds).collect() };
+    let of_edge = |facets: &Vec<BorderFacet>| {
+        let runs: Vec<_> = facets.chunks(RUN).map(|run| bounding_box(&tissue, &configuration, run)).collect();
+        EdgeBox { whole: runs.iter().copied().fold(NOWHERE, both), runs }
+    };
     boxes.edges = tissue.edges.iter().map(of_edge).collect();
 }
 
+/// The box about nothing.
+const NOWHERE: Bounds = [[f64::INFINITY; 2], [f64::NEG_INFINITY; 2]];
+
+/// The box about two.
+fn both(a: Bounds, b: Bounds) -> Bounds {
+    [[0, 1].map(|k| a[0][k].min(b[0][k])), [0, 1].map(|k| a[1][k].max(b[1][k]))]
+}
+
 fn bounding_box(tissue: &Tissue, configuration: &Configuration, facets: &[BorderFacet]) -> Bounds {
-    let mut bounds = [[f64::INFINITY; 2], [f64::NEG_INFINITY; 2]];
-    for vertex in facets.iter().flat_map(|facet| tissue.mesh.facet_vertices(*facet)) {
-        let [low, high] = configuration.range(vertex as usize);
-        for k in 0..2 {
-            bounds[0][k] = bounds[0][k].min(low[k]);
-            bounds[1][k] = bounds[1][k].max(high[k]);
-        }
-    }
-    bounds
+    let vertices = facets.iter().flat_map(|facet| tissue.mesh.facet_vertices(*facet));
+    vertices.map(|vertex| configuration.range(vertex as usize)).fold(NOWHERE, both)
 }
 
 fn repel(

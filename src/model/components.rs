@@ -62,6 +62,11 @@ pub enum Status {
 kept! { enum Status { Unborn, Growing, Stalled, Arrived, Left, Retracting, Withdrawn, Waiting } }
 
 impl Status {
+    /// Whether it grows, now or in another part of the step.
+    pub fn grows(self) -> bool {
+        matches!(self, Status::Growing | Status::Waiting)
+    }
+
     /// The word used in results.
     pub fn word(self) -> &'static str {
         match self {

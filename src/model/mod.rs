@@ -20,6 +20,7 @@ pub mod mechanism;
 mod movers;
 pub mod observables;
 mod open_end;
+mod pace;
 pub mod plan;
 pub mod quantity;
 mod quantity_macro;

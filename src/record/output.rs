@@ -125,8 +125,9 @@ impl Drop for Partial {
 /// Makes a folder for files of one ending, and removes those that an earlier run left there.
 ///
 /// # Errors
-/// The path and the system's reason.
+/// The path and the system's reason; a link in its place.
 pub fn clear_folder(folder: &Path, ending: &str) -> Result<(), WriteError> {
+    no_link(folder)?;
     let clear = || {
         fs::create_dir_all(folder)?;
         for entry in fs::read_dir(folder)? {

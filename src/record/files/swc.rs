@@ -32,8 +32,11 @@ impl SwcFiles {
     /// Begins in the folder of results.
     ///
     /// # Errors
-    /// The path and the system's reason.
+    /// A link in the place of the folder of trees.
     pub fn create(folder: &Path, keys: Swc) -> Result<Self, OutputError> {
+        if !keys.archive {
+            no_link(&folder.join("swc"))?;
+        }
         Ok(Self { folder: folder.to_owned(), keys, looks: 0, single: BTreeSet::new(), written: 0 })
     }
 
@@ -53,12 +56,9 @@ impl Output for SwcFiles {
         match self.keys.archive {
             true => write_archive(&self.place().with_extension("zip"), files)?,
             false => {
-                let place = self.folder.join("swc");
-                no_link(&place)?;
                 if self.looks == 0 {
-                    clear_numbered(&place, "swc")?;
+                    clear_numbered(&self.folder.join("swc"), "swc")?;
                 }
-                no_link(&self.place())?;
                 write_folder(&self.place(), files)?;
             }
         }

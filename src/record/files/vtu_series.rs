@@ -32,7 +32,6 @@ impl VtuSeries {
     /// The path and the system's reason.
     pub fn create(folder: &Path, name: &'static str, grid: View) -> Result<Self, OutputError> {
         no_link(&folder.join("vtu"))?;
-        no_link(&folder.join("vtu").join(name))?;
         Ok(Self { folder: folder.join("vtu"), name, grid, times: Vec::new() })
     }
 

@@ -22,7 +22,7 @@
 //! Pairs of places, and of a step with a mesh size half-way between two, are then tried in order of what the
 //! whole scene would take with them (a step that was bad on the middling mesh may be good on a finer one), and the
 //! first is taken whose tips lie within ε of those of one run with the finest of both, whose own error is added as an
-//! independent one (and that of the matrix' mesh, common to all, as it is), as long as those tried come to 16 such runs (within 0.9 ε where pilots have not all axons). That time is reckoned from counts, not measured, so
+//! independent one (and that of the matrix' mesh, common to all, as it is), as long as those tried come to 16 runs with the dearest of them (within 0.9 ε where pilots have not all axons). That time is reckoned from counts, not measured, so
 //! that the choice is the same everywhere. The tolerance of the load path is ε/1000. Keys that the scene gives itself
 //! are kept. Ours: all of this.
 

@@ -20,7 +20,7 @@ const TAKEN: f64 = 1.0;
 const TAKEN_OF_SOME: f64 = 0.9;
 /// By how much a mesh of the matrix' own may move tips, over the accuracy asked for.
 const BY_MATRIX: f64 = 0.1;
-/// What the pairs tried may take together, over one run with the finest of both.
+/// What the pairs tried may take together, over one run with the dearest of them.
 const TRIALS: f64 = 16.0;
 /// Tolerance of the load path over the accuracy.
 const LEVELS: f64 = 1e-3;

@@ -30,6 +30,7 @@ use rayon::prelude::*;
 use rstar::primitives::GeomWithData;
 use rstar::{AABB, RTree, RTreeNode};
 use squares::{Listed, Square, Squares, corners, name, part_of, parts_near, square, squares_near, unname};
+use std::ops::Range;
 
 type Entry = GeomWithData<[f64; 2], VertexId>;
 const _: () = assert!(BLOCK <= u16::BITS as usize);
@@ -75,6 +76,14 @@ impl Seat {
     fn shares_square(&self, other: &Self) -> bool {
         self.square == other.square
     }
+}
+
+/// Cones in one square that are served by one task.
+struct Group<'a> {
+    task: usize,
+    seats: &'a [Seat],
+    /// Where among the [noted](Places::noted) parts is what may be near them.
+    near: Range<usize>,
 }
 
 /// The neighbour index over all shaft segments.
@@ -139,16 +148,18 @@ impl ShaftIndex {
         self.prepare(scene, &order);
         let mut found: Vec<Option<T>> = std::iter::repeat_with(|| None).take(cones.len()).collect();
         for batch in order.chunks(BATCH) {
-            self.place(scene, batch);
-            let serve = |(segments, parts, work): &mut (Segments<2>, Vec<Part>, S), task: &[Seat]| -> Vec<_> {
-                let mut found = Vec::with_capacity(task.len());
-                for group in task.chunk_by(Seat::shares_square) {
-                    self.gather(group, cones, (segments, parts));
-                    found.extend(group.iter().map(|seat| (seat.cone, act(work, &cones[seat.cone as usize], segments))));
+            let groups = self.place(scene, batch);
+            let serve = |(segments, met, work): &mut (Segments<2>, Vec<Part>, S), task: &[Group]| -> Vec<_> {
+                let mut found = Vec::with_capacity(TASK);
+                for group in task {
+                    self.gather(group, cones, (segments, met));
+                    let act = |seat: &Seat| (seat.cone, act(work, &cones[seat.cone as usize], segments));
+                    found.extend(group.seats.iter().map(act));
                 }
                 found
             };
-            let tasks: Vec<Vec<(u32, T)>> = batch.par_chunks(TASK).map_init(Default::default, serve).collect();
+            let tasks = groups.par_chunk_by(|a, b| a.task == b.task).map_init(Default::default, serve);
+            let tasks: Vec<Vec<(u32, T)>> = tasks.collect();
             tasks.into_iter().flatten().for_each(|(i, value)| found[i as usize] = Some(value));
         }
         found.into_iter().flatten().collect()
@@ -173,21 +184,24 @@ impl ShaftIndex {
         }
     }
 
-    /// Finds where everything is that a batch looks at.
-    fn place(&mut self, scene: &ShaftScene, batch: &[Seat]) {
+    /// Finds where everything is that a batch looks at; returns its cones in groups, each with its share of that.
+    fn place<'a>(&mut self, scene: &ShaftScene, batch: &'a [Seat]) -> Vec<Group<'a>> {
         let mut places = std::mem::take(&mut self.places);
-        places.find(scene, batch.chunk_by(Seat::shares_square).flat_map(|group| self.near(group)));
+        places.begin(scene);
+        let everything = (self.search == Search::All).then(|| places.note(listed(&self.everything, u16::MAX)));
+        let mut groups = Vec::with_capacity(batch.len());
+        for (task, seats) in batch.chunks(TASK).enumerate() {
+            for seats in seats.chunk_by(Seat::shares_square) {
+                let near = everything.clone().unwrap_or_else(|| {
+                    let parts = seats.iter().fold(0, |parts, seat| parts | seat.part);
+                    places.note(listed(self.squares.get(seats[0].square).unwrap_or_default(), parts))
+                });
+                groups.push(Group { task, seats, near });
+            }
+        }
+        places.find(scene);
         self.places = places;
-    }
-
-    /// What may be near some cones in one square.
-    fn near(&self, group: &[Seat]) -> impl Iterator<Item = Part> + '_ {
-        let list = match self.search {
-            Search::All => &self.everything,
-            Search::Grid | Search::Tree => self.squares.get(group[0].square).unwrap_or_default(),
-        };
-        let parts = group.iter().fold(0, |parts, seat| parts | seat.part);
-        list.iter().filter(move |listed| listed.parts & parts != 0).map(|listed| (listed.block, listed.vertices))
+        groups
     }
 
     /// One list of all vertices: no cone is spared anything.
@@ -221,12 +235,12 @@ impl ShaftIndex {
         made.into_iter().for_each(|(square, list)| *self.squares.make(square) = list);
     }
 
-    /// The segments of a square's list that come near any cone of a group.
-    fn gather(&self, group: &[Seat], cones: &[Asking], (segments, met): (&mut Segments<2>, &mut Vec<Part>)) {
-        let positions = || group.iter().map(|seat| cones[seat.cone as usize].position.xy());
+    /// The segments of what may be near that come near any cone of a group.
+    fn gather(&self, group: &Group, cones: &[Asking], (segments, met): (&mut Segments<2>, &mut Vec<Part>)) {
+        let positions = || group.seats.iter().map(|seat| cones[seat.cone as usize].position.xy());
         let low = positions().fold(Vector2::repeat(f64::INFINITY), |m, x| m.inf(&x)).add_scalar(-self.reach);
         let high = positions().fold(Vector2::repeat(f64::NEG_INFINITY), |m, x| m.sup(&x)).add_scalar(self.reach);
-        let near = self.near(group).map(|(block, vertices)| (self.places.number(block), vertices));
+        let near = self.places.noted(&group.near).iter().copied();
         segments.clear();
         match self.search {
             Search::All => {
@@ -279,6 +293,11 @@ impl ShaftIndex {
             }
         }
     }
+}
+
+/// Blocks of a list that may be near to some parts of its square, with the vertices that are meant.
+fn listed(list: &[Listed], parts: u16) -> impl Iterator<Item = Part> + '_ {
+    list.iter().filter(move |listed| listed.parts & parts != 0).map(|listed| (listed.block, listed.vertices))
 }
 
 /// Parts of lists that a stored vertex takes, with the room in them. Ours, measured.

@@ -233,15 +233,18 @@ impl<const D: usize> WithSimd for Look<'_, D> {
         let segments = self.segments;
         let mut seen = [0; BATCH];
         for (batch, views) in self.views.iter_mut().enumerate() {
-            let start = segments.start.each_ref().map(|column| &column[batch]);
-            let tangent = segments.tangent.each_ref().map(|column| &column[batch]);
-            let (length, owner) = (&segments.length[batch], &segments.owner[batch]);
-            for i in 0..BATCH {
+            let used = BATCH.min(segments.count - batch * BATCH);
+            let lanes = used.next_multiple_of(LANES).min(BATCH);
+            let start = segments.start.each_ref().map(|column| &column[batch][..lanes]);
+            let tangent = segments.tangent.each_ref().map(|column| &column[batch][..lanes]);
+            let (length, owner) = (&segments.length[batch][..lanes], &segments.owner[batch][..lanes]);
+            let seen_here = &mut seen[..lanes];
+            for i in 0..lanes {
                 let (sight, _) = look(start.map(|c| c[i]), tangent.map(|c| c[i]), length[i], self.x, self.e);
                 let view = self.felt.view(&sight) as u64;
-                seen[i] = if owner[i] == self.own { View::Nothing as u64 } else { view };
+                seen_here[i] = if owner[i] == self.own { View::Nothing as u64 } else { view };
             }
-            seen[BATCH.min(segments.count - batch * BATCH)..].fill(View::Nothing as u64);
+            seen[used..].fill(View::Nothing as u64);
             let pairs = |half: usize| (0..PAIRS).fold(0, |pairs, i| pairs | (seen[half * PAIRS + i] << (2 * i)));
             *views = [pairs(0), pairs(1)];
         }

@@ -8,6 +8,7 @@ use crate::model::shafts::BLOCK;
 use crate::numerics::locate::MaterialPoint;
 use crate::numerics::polylines::{Part, Polyline};
 use rayon::prelude::*;
+use std::ops::Range;
 
 /// Positions now (µm) of a block's vertices, and of the point that the last of them leads to.
 pub type Line = Polyline<{ BLOCK + 1 }>;
@@ -33,19 +34,34 @@ pub struct Places {
     blocks: Vec<u32>,
     /// For each block the number of its line, good if that line is of the block.
     numbers: Vec<u32>,
+    /// What was noted: numbers of lines, with the vertices that are meant.
+    parts: Vec<Part>,
 }
 
 impl Places {
-    /// Finds the blocks of some parts where they are now.
-    pub fn find(&mut self, scene: &ShaftScene, looked_at: impl Iterator<Item = Part>) {
+    /// Forgets what was noted.
+    pub fn begin(&mut self, scene: &ShaftScene) {
         self.numbers.resize(scene.shafts.block_count(), 0);
         self.blocks.clear();
-        for (block, _) in looked_at {
-            if self.blocks.get(self.numbers[block as usize] as usize) != Some(&block) {
-                self.numbers[block as usize] = self.blocks.len() as u32;
+        self.parts.clear();
+    }
+
+    /// Notes that some parts, named by their blocks, are looked at; returns where they stand among all that are noted.
+    pub fn note(&mut self, looked_at: impl Iterator<Item = Part>) -> Range<usize> {
+        let first = self.parts.len();
+        for (block, vertices) in looked_at {
+            let number = &mut self.numbers[block as usize];
+            if self.blocks.get(*number as usize) != Some(&block) {
+                *number = self.blocks.len() as u32;
                 self.blocks.push(block);
             }
+            self.parts.push((*number, vertices));
         }
+        first..self.parts.len()
+    }
+
+    /// Finds where the blocks are now that were noted.
+    pub fn find(&mut self, scene: &ShaftScene) {
         // By itself, a loop so short that the processor waits for many of them at once.
         self.heads.clear();
         self.heads.extend(self.blocks.iter().map(|&block| Head::of(scene, block)));
@@ -54,14 +70,14 @@ impl Places {
         lines.with_min_len(64).for_each(|((line, &block), head)| *line = scene.polyline(block, head.after));
     }
 
+    /// The parts that were noted, by the numbers of their lines.
+    pub fn noted(&self, near: &Range<usize>) -> &[Part] {
+        &self.parts[near.clone()]
+    }
+
     /// The lines that were found.
     pub fn lines(&self) -> &[Line] {
         &self.lines
-    }
-
-    /// The number of the line of a block that was looked at.
-    pub fn number(&self, block: u32) -> u32 {
-        self.numbers[block as usize]
     }
 
     /// The shaft of a line, and its kind.

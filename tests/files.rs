@@ -130,6 +130,44 @@ fn the_lengths_of_trees_are_those_of_the_summary_and_single_points_are_listed() 
 
 #[test]
 #[cfg(unix)]
+fn a_new_run_clears_all_files_of_an_earlier_one_and_nothing_else() {
+    let folder = with_scene(&scene());
+    let (out, own) = (folder.0.join("out/scene"), folder.0.join("own"));
+    std::fs::create_dir_all(&own).unwrap();
+    std::fs::create_dir_all(&out).unwrap();
+    // In a folder that is not yet that of a run nothing is an earlier run's.
+    std::fs::write(out.join("axons.csv"), "mine").unwrap();
+    run(&folder, &["--set", "/output/frames=0", "--set", "/output/swc={\"archive\": true, \"interval\": 1}"]);
+    assert_eq!(std::fs::read_to_string(out.join("axons.csv")).unwrap(), "mine");
+    assert_eq!(names(out.join("swc")).len(), 5, "archives at 0 to 4 h");
+    run(&folder, &ALL);
+    assert_eq!(names(out.join("swc")), ["0000", "0001", "0002"], "archives of the run before are gone");
+    let mine = ["mine.csv", "swc/0001/mine.swc", "swc/axon_x.swc", "vtu/tissue/mine.vtu", "vtu/notes.txt"];
+    mine.iter().for_each(|name| std::fs::write(out.join(name), "mine").unwrap());
+    std::fs::write(own.join("0000.vtu"), "mine").unwrap();
+    std::fs::remove_dir_all(out.join("vtu/fields")).unwrap();
+    std::os::unix::fs::symlink(&own, out.join("vtu/fields")).unwrap();
+    run(&folder, &["--set", "/output/tables=parquet", "--set", "/output/frames=0", "--set", "/output/figure_times=[]"]);
+    let expected = ["manifest.json", "mine.csv", "summary.json", "swc", "trajectories.parquet", "vtu"];
+    assert_eq!(names(&out), expected);
+    mine.iter().for_each(|name| assert!(out.join(name).exists(), "{name}"));
+    assert_eq!(names(out.join("vtu")), ["fields", "notes.txt", "tissue"]);
+    assert_eq!(
+        (names(out.join("swc")), names(out.join("swc/0001"))),
+        (vec!["0001".into(), "axon_x.swc".into()], vec!["mine.swc".into()])
+    );
+    assert_eq!(names(&own), ["0000.vtu"], "a link is not followed");
+    // Runs over seeds write less still.
+    std::fs::remove_file(out.join("vtu/fields")).unwrap();
+    run(&folder, &ALL);
+    run(&folder, &["--seeds", "2", "--set", "/output/figure_times=[]"]);
+    assert!(
+        !out.join("measures.csv").exists() && !out.join("report.html").exists() && !out.join("vtu/shafts").exists()
+    );
+}
+
+#[test]
+#[cfg(unix)]
 fn trees_of_an_earlier_run_go_and_a_link_is_not_followed() {
     let folder = with_scene(&scene());
     let swc =

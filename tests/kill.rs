@@ -212,6 +212,47 @@ fn a_signal_finishes_the_step_writes_what_there_is_and_says_so() {
     }
 }
 
+/// Sends SIGINT to a child, and tells whether it ends within a second.
+fn ends_by_interrupt(child: &mut Child) -> bool {
+    assert!(Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success());
+    wait(child, Duration::from_secs(1))
+}
+
+#[test]
+fn a_signal_within_a_long_step_or_a_long_mesh_is_heard_at_once_if_it_is_the_second() {
+    use std::os::unix::process::ExitStatusExt;
+    let folder = Folder::new();
+    let mut long = scene();
+    long["time"] = json!({ "duration": 8, "step": 2, "method": "bogacki_shampine", "tolerance": 1e-12 });
+    long["populations"]["axons"] = json!({ "count": 500, "births": { "at": 0 } });
+    folder.write("long_step.json", &long.to_string());
+    let mut large = scene();
+    large["tissue"]["mesh_size"] = json!(0.3);
+    folder.write("long_mesh.json", &large.to_string());
+    let begun = |arguments: &[&str], there: &str| {
+        let mut child = tropism(&folder.0, arguments).stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
+        while !folder.0.join(there).exists() {
+            assert!(!wait(&mut child, Duration::from_millis(5)), "it ended before it was stopped");
+        }
+        assert!(!wait(&mut child, Duration::from_millis(300)), "it ended before it was stopped");
+        child
+    };
+    // The manifest is written just before the first step.
+    let mut child = begun(&["long_step.json", "--out", "step"], "step/manifest.json");
+    assert!(!ends_by_interrupt(&mut child), "the first finishes the step, which takes longer");
+    assert!(ends_by_interrupt(&mut child), "the second ends the program at once");
+    assert_eq!(child.wait().unwrap().code(), Some(130));
+    assert!(!demand_whole(&folder.0.join("step")) && !folder.0.join("step/summary.json").exists());
+    // A run by itself catches signals from its first step on; before, the first ends it as it ends any program.
+    let mut child = begun(&["long_mesh.json", "--out", "mesh"], "mesh");
+    assert!(ends_by_interrupt(&mut child), "before the first step the first ends the program");
+    assert_eq!(child.wait().unwrap().signal(), Some(2));
+    assert_eq!(std::fs::read_dir(folder.0.join("mesh")).unwrap().count(), 0, "nothing was written");
+    let mut child = begun(&["long_mesh.json", "--out", "seeds", "--seeds", "2", "--memory", "any"], "seeds");
+    let first = ends_by_interrupt(&mut child);
+    assert!(first || ends_by_interrupt(&mut child), "the second ends the program at once, in a mesh too");
+}
+
 #[test]
 fn a_command_that_writes_at_its_end_says_that_it_was_stopped() {
     let folder = Folder::new();

@@ -18,6 +18,7 @@ pub mod checkpoint;
 pub mod colour;
 pub mod csv;
 mod cue_scale;
+pub mod earlier;
 pub mod fascicles;
 pub mod files;
 pub mod leaves;

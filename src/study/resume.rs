@@ -37,10 +37,10 @@ impl<'a> Checkpoints<'a> {
     ///
     /// # Errors
     /// The file that cannot be written or removed.
-    pub fn begin(&mut self, run: &Run) -> Result<(), RunError> {
+    pub fn begin(&mut self, run: &mut Run) -> Result<(), RunError> {
         checkpoint::remove(self.folder)?;
+        write_json(&self.folder.join("manifest.json"), &Manifest::of(self.asked.loaded))?;
         if self.interval.is_some() {
-            write_json(&self.folder.join("manifest.json"), &Manifest::of(self.asked.loaded))?;
             self.write(run)?;
         }
         Ok(())
@@ -51,12 +51,14 @@ impl<'a> Checkpoints<'a> {
         self.interval.is_some_and(|interval| self.since.seconds() >= interval)
     }
 
-    /// Writes one, between two steps.
+    /// Writes one, between two steps; what that takes is booked under `checkpoint`.
     ///
     /// # Errors
     /// The file that cannot be written; the checkpoints that were there stay.
-    pub fn write(&mut self, run: &Run) -> Result<(), WriteError> {
+    pub fn write(&mut self, run: &mut Run) -> Result<(), WriteError> {
+        run.simulation.lap("record");
         let written = self.of(run).and_then(|checkpoint| checkpoint.write(self.folder));
+        run.simulation.lap("checkpoint");
         self.since = Elapsed::default();
         written
     }

@@ -240,7 +240,7 @@ impl Run {
     ///
     /// # Errors
     /// A record that cannot be kept. A fault while running is no error.
-    pub fn to_end(&mut self, mut between: impl FnMut(&Self) -> Option<String>) -> Result<Ended, RunError> {
+    pub fn to_end(&mut self, mut between: impl FnMut(&mut Self) -> Option<String>) -> Result<Ended, RunError> {
         loop {
             let Self { simulation, recorder, outputs } = self;
             let now = simulation.world().resource::<Clock>().now;

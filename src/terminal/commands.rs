@@ -7,6 +7,7 @@ use super::voice::{alarm, bytes_out, note, say, tell};
 use crate::model::mechanism::Roster;
 use crate::new_mechanism::{NewMechanism, NewMechanismError};
 use crate::record::checkpoint;
+use crate::record::earlier;
 use crate::record::manifest::Manifest;
 use crate::record::output::prepare_folder;
 use crate::scenario::catalogue::Catalogue;
@@ -208,6 +209,7 @@ pub fn run_seeds(cli: &Cli, roster: &Roster, loaded: &Loaded, folder: &Path, cou
     admit_many(&cli.scene, loaded, roster, count)?;
     let interrupt = Interrupt::catch().map_err(|error| RunError::Internal(error.to_string()))?;
     checkpoint::remove(folder)?;
+    earlier::clear(folder)?;
     let bar = progress_bar(count as f64, "seeds");
     let tick = |share| bar.set_position((share * 1000.0) as u64);
     let stop = || interrupt.caught().map(|signal| signal.name.to_owned());

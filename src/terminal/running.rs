@@ -6,12 +6,14 @@ use super::voice::{alarm, is_loud, note, tell};
 use crate::model::mechanism::Roster;
 use crate::model::quantity::{Quantity, Time};
 use crate::record::checkpoint;
+use crate::record::earlier;
 use crate::record::output::prepare_folder;
 use crate::study::plan::memory_of;
 use crate::study::report::Asked;
 use crate::study::resume::{Checkpoints, Found, Resumed, pick_up};
 use crate::study::room::Room;
 use crate::study::run::{Ended, Records, Run, RunError, write_results};
+use std::collections::BTreeSet;
 use std::path::Path;
 use std::process::ExitCode;
 
@@ -38,9 +40,10 @@ pub fn run_once(
 ) -> Result<ExitCode, RunError> {
     let mut run = Run::begin(asked.loaded, roster, path, Records::ALL)?;
     room.admit(&asked.loaded.scene.name, &memory_of(&run.simulation, asked.loaded, Records::ALL)?, 1)?;
+    earlier::clear(folder)?;
     run.writes_into(folder, asked.loaded)?;
     let mut checkpoints = Checkpoints::new(folder, interval, (asked, path));
-    checkpoints.begin(&run)?;
+    checkpoints.begin(&mut run)?;
     watch(run, asked, checkpoints)
 }
 
@@ -70,13 +73,19 @@ fn watch(mut run: Run, asked: Asked, mut checkpoints: Checkpoints) -> Result<Exi
     let interrupt = Interrupt::catch().map_err(|error| RunError::Internal(error.to_string()))?;
     let bar = progress_bar(asked.loaded.scene.time.duration.0, "h");
     let mut signal = None;
+    let mut told = BTreeSet::new();
     let ended = run.to_end(|run| {
         bar.set_position((run.simulation.progress() * 1000.0) as u64);
         signal = interrupt.caught();
         if signal.is_some() || checkpoints.is_due() {
             let written = checkpoints.write(run);
             if let Err(error) = &written {
-                alarm!("warning: no checkpoint at t = {} h: {error}", run.simulation.time());
+                let reason = error.to_string();
+                // Each reason once, or checkpoints that are due after every step would say it as often; but to whom stops the run, again.
+                if !told.contains(&reason) || signal.is_some() {
+                    alarm!("warning: no checkpoint at t = {} h: {reason}", run.simulation.time());
+                    told.insert(reason);
+                }
             }
             return signal.map(|signal| stopped(signal, checkpoints.folder, written.is_ok()));
         }

@@ -119,6 +119,11 @@ const STRIDE: f64 = 0.25;
 /// Slower than this (µm/h), a point is at rest.
 const REST: f64 = 0.3;
 
+/// Moves that the two ends of a pair may take within a step. Far more than the way along any shaft takes: forces that never come to
+/// balance end the run.
+#[derive(Debug, Clone, Copy, Resource)]
+pub struct MostMoves(pub u32);
+
 impl Mechanism for Zippering {
     const NAME: &'static str = "zippering";
 
@@ -134,16 +139,29 @@ impl Mechanism for Zippering {
         if self.adhesion.0 > 0.0 {
             model.phase(Phase::Remodel, zip);
         }
-        model.insert(Zippers::default()).keep::<Zippers>().sound_if::<Zippers>(Zippers::are_sound).insert_law(self);
+        model
+            .insert(MostMoves(100_000))
+            .insert(Zippers::default())
+            .keep::<Zippers>()
+            .sound_if::<Zippers>(Zippers::are_sound)
+            .insert_law(self);
         Ok(())
     }
 }
 
-fn zip(law: Res<Law<Zippering>>, mut zippers: ResMut<Zippers>, mut remodelling: Remodelling) {
+fn zip(
+    (law, most): (Res<Law<Zippering>>, Res<MostMoves>),
+    mut zippers: ResMut<Zippers>,
+    mut remodelling: Remodelling,
+    mut health: ResMut<Health>,
+) {
     let now = remodelling.clock.hours();
     let span = now - std::mem::replace(&mut zippers.last, now);
     zippers.welcome(&law, &remodelling);
-    let fastest = zippers.advance(&law, &remodelling, span);
+    let fastest = zippers.advance(&law, &remodelling, (span, most.0)).unwrap_or_else(|restless| {
+        health.report(now, format!("zippering: {restless} do not come to rest within {} moves in one step", most.0));
+        0.0
+    });
     zippers.lay(&mut remodelling);
     remodelling.unrest.0 |= fastest > 0.0;
 }
@@ -246,13 +264,20 @@ impl Zippers {
         true
     }
 
-    /// Moves all zipper points over a time (h); returns the speed of the fastest (µm/h).
-    fn advance(&mut self, law: &Zippering, remodelling: &Remodelling, span: f64) -> f64 {
+    /// Moves all zipper points over a time (h), each pair's by `most` moves; returns the speed of the fastest (µm/h).
+    ///
+    /// # Errors
+    /// The pair that takes more, and where.
+    fn advance(&mut self, law: &Zippering, remodelling: &Remodelling, (span, most): (f64, u32)) -> Result<f64, String> {
         let balance = Balance::from(law);
         let mut fastest = 0.0f64;
         for bond in (0..self.bonds.len()).filter(|&bond| self.bonds[bond].is_some()).collect::<Vec<_>>() {
-            let mut left = span;
+            let (mut left, mut moves) = (span, 0);
             while left > 0.0 {
+                if moves == most {
+                    return Err(self.whereabouts(bond, remodelling));
+                }
+                moves += 1;
                 let mut taken = left;
                 let velocities = [false, true].map(|forward| {
                     self.straighten((bond, forward), law.arm.0, remodelling);
@@ -275,7 +300,19 @@ impl Zippers {
                 fastest = fastest.max(speed);
             }
         }
-        fastest
+        Ok(fastest)
+    }
+
+    /// A pair and where its ends are, in words.
+    fn whereabouts(&self, bond: usize, remodelling: &Remodelling) -> String {
+        let end = |forward: bool| {
+            let (shaft, at, _) = self.place((bond, forward), 0)?;
+            let place = remodelling.position(self.lines.get(&shaft)?.get(at)?.point.site);
+            Some(format!("({:.4}, {:.4}) um", place.x, place.y))
+        };
+        let ends: Vec<String> = [false, true].into_iter().filter_map(end).collect();
+        let [one, other] = self.bonds[bond].map_or([0; 2], |bond| bond.shafts);
+        format!("the points where the shafts {one} and {other} part, at {}", ends.join(" and "))
     }
 
     /// Place of a zipper point in the line of one of its shafts, and the direction in which its arm goes on there.

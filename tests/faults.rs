@@ -3,19 +3,21 @@
 
 mod common;
 
-use common::Folder;
+use common::{Folder, loaded};
 use serde_json::{Value, json};
 use std::path::Path;
 use std::process::{Command, ExitCode, Stdio};
 use tropism::prelude::*;
+use tropism::simulation::Simulation;
 use tropism::systems;
+use tropism::systems::zippering::MostMoves;
 
 keys! {
     /// Breaks something at a time.
     pub struct Sabotage {
         /// When.
         pub at: Time = Time(2.0),
-        /// What: `pull`, `site`, `cell`, `vertex`, `equilibrium`.
+        /// What: `pull`, `site`, `cell`, `vertex`, `equilibrium`, `zippers` (which may hardly move).
         pub what: String = String::new(),
     }
 }
@@ -34,6 +36,10 @@ impl Mechanism for Sabotage {
             "site" => model.phase(Phase::Remodel, spoil_site),
             "cell" => model.motion(turn_cell_over),
             "vertex" => model.motion(lose_vertex),
+            "zippers" => model.at_end(|world| {
+                world.insert_resource(MostMoves(2));
+                Ok(())
+            }),
             _ => model.motion(lose_equilibrium),
         };
         model.insert_law(self);
@@ -117,6 +123,7 @@ fn broken(what: &str, method: &str) -> String {
     assert!((1.8..2.21).contains(&last), "{what}: what was recorded is kept, up to {last} h");
     assert!(table.lines().skip(1).all(|row| row.split(',').count() == 6));
     assert!(!out.join("checkpoint.bin").exists(), "{what}: there is nothing to go on from");
+    assert!(summary["cost"]["seconds"]["checkpoint"].as_f64().unwrap() > 0.0, "{what}: a first one was written");
     let fault = summary["fault"].as_str().unwrap().to_owned();
     assert!(fault.starts_with("at t = 2"), "{what}: {fault}");
     fault
@@ -156,6 +163,52 @@ fn an_equilibrium_lost_on_the_way_ends_the_run() {
     assert!(
         broken("equilibrium", "rotation").ends_with("equilibrium lost at load 0.4: residual 3e-2 after 25 iterations")
     );
+}
+
+/// Steps a scene until a fault ends it.
+fn fault_of(scene: &Value) -> String {
+    let roster = systems::standard().with::<Sabotage>();
+    let mut simulation = Simulation::assemble(&loaded(scene, &roster), &roster).unwrap();
+    while !simulation.is_over() {
+        if let Err(fault) = simulation.step() {
+            return fault.account;
+        }
+    }
+    panic!("it came to its end");
+}
+
+#[test]
+fn a_step_that_takes_more_parts_than_any_run_has_patience_for_is_given_up_with_the_key() {
+    let mut scene = scene();
+    scene["time"] = json!({ "duration": 2, "step": 1, "method": "bogacki_shampine", "tolerance": 1e-12 });
+    let fault = fault_of(&scene);
+    let words = "takes more than 4000 parts a growing cone to keep errors within 1e-12 um, /time/tolerance: a larger";
+    assert!(fault.contains(words), "{fault}");
+    scene["time"]["tolerance"] = json!(1e-4);
+    let roster = systems::standard();
+    let mut simulation = Simulation::assemble(&loaded(&scene, &roster), &roster).unwrap();
+    simulation.step().unwrap();
+}
+
+#[test]
+fn zipper_points_that_do_not_come_to_rest_end_the_run_with_their_place() {
+    let axon = |x: f64, heading: f64| json!({ "count": 1, "origin": { "points": [[x, 20]] }, "heading": heading, "births": { "at": 0 }, "speed": 50 });
+    let mut scene = json!({
+        "tissue": { "outline": { "rectangle": { "width": 300, "height": 200 } }, "mesh_size": 40 },
+        "time": { "duration": 8, "step": "3 min" },
+        "growth": { "on_border": "stall" },
+        "populations": { "left": axon(132.0, 78.0), "right": axon(168.0, 102.0) },
+        "zippering": { "arm": 20 }
+    });
+    let roster = systems::standard();
+    let mut simulation = Simulation::assemble(&loaded(&scene, &roster), &roster).unwrap();
+    while !simulation.is_over() {
+        simulation.step().unwrap();
+    }
+    scene["sabotage"] = json!({ "what": "zippers" });
+    let fault = fault_of(&scene);
+    let words = "zippering: the points where the shafts 1 and 0 part, at (150.";
+    assert!(fault.starts_with(words) && fault.ends_with("do not come to rest within 2 moves in one step"), "{fault}");
 }
 
 fn tropism(folder: &Folder, arguments: &[&str]) -> (i32, String) {
@@ -247,6 +300,7 @@ fn a_full_disk_is_told_and_what_had_been_written_stays_readable() {
     let (code, words) = tropism(&folder, &arguments);
     assert_eq!(code, 1, "{words}");
     assert!(words.contains("cannot write ") && words.contains("No space left on device"), "{words}");
+    assert_eq!(words.matches("warning: no checkpoint at t = ").count(), 1, "one warning a reason: {words}");
     demand_whole_files(&tiny.0);
 }
 

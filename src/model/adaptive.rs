@@ -14,7 +14,8 @@
 //!
 //! The clock's step Δt is the largest. A cone takes it whole or in parts of Δt/2, Δt/4, …, which end at multiples of themselves, so
 //! that they meet the same instants and the same Brownian path. Those of one size step together while the others wait
-//! ([`Status::Waiting`]); at multiples of Δt all meet. Shafts are those of the step's start for all of them. Where a
+//! ([`Status::Waiting`]); at multiples of Δt all meet. A step of the clock that takes more than 4000 parts for each growing cone, on
+//! average, ends the run: a tolerance may ask for what no computer does. Shafts are those of the step's start for all of them. Where a
 //! mechanism lets cones act on one another within a step, all take the steps of the one that needs the shortest.
 
 use super::clock::{Clock, Kinks};
@@ -28,6 +29,9 @@ use crate::kept;
 use crate::numerics::runge_kutta::ButcherTableau;
 use bevy_ecs::change_detection::DetectChangesMut;
 use bevy_ecs::prelude::{Resource, World};
+
+/// Parts of a step of the clock that growing cones may take, rejected ones too, on average.
+const MOST_PARTS: u64 = 4000;
 
 /// What chooses the steps; absent with a method of fixed steps.
 #[derive(Debug, Clone, PartialEq, Resource)]
@@ -95,9 +99,11 @@ pub(super) fn adaptive_step(
         (stages.level, stages.reached) = (*level, span.0);
     }
     let rule = Rule { whole, tolerance, order: pair.order };
-    let mut cover = Cover { cones, starts, pair, rule, duration, together, taken: 0, missed: Vec::new() };
+    let growing = cones.iter(world).filter(|cone| cone.1.grows()).count() as u64;
+    let left = Some(MOST_PARTS * growing);
+    let mut cover = Cover { cones, starts, pair, rule, duration, together, left, taken: 0, missed: Vec::new() };
     cover.cover(world, span, true);
-    let Cover { taken, missed, .. } = cover;
+    let Cover { taken, missed, left, .. } = cover;
     for mut cone in cones.iter_mut(world).filter(|cone| *cone.1 == Status::Waiting) {
         cone.1.set_if_neq(Status::Growing);
     }
@@ -108,8 +114,19 @@ pub(super) fn adaptive_step(
         let mut steps = world.resource_mut::<AdaptiveSteps>();
         steps.levels = levels;
         steps.note_misses(&missed, &mut health);
+        if left.is_none() {
+            health.report(world.resource::<Clock>().hours(), too_many_parts(tolerance));
+        }
     });
     taken
+}
+
+/// What is said of a step that was given up, at the time of its start.
+fn too_many_parts(tolerance: f64) -> String {
+    format!(
+        "the step from here takes more than {MOST_PARTS} parts a growing cone to keep errors within {tolerance:e} um, /time/tolerance: a larger \
+         one is needed, or a method of fixed steps"
+    )
 }
 
 /// Brings the clock to an instant (ticks) at which a step ends.
@@ -131,6 +148,8 @@ struct Cover<'a> {
     /// Duration of the run (h).
     duration: f64,
     together: bool,
+    /// Steps that cones may still try; none if they have tried too many.
+    left: Option<u64>,
     /// Steps of cones taken so far.
     taken: u64,
     /// Errors of steps of one tick beyond the tolerance (µm).
@@ -154,6 +173,7 @@ impl Cover<'_> {
         let takes_whole = |stages: &Stages| whole >> stages.level.max(deepest) >= to - from;
         let trying = self.call_up(world, |cone, stages| is_due(cone, stages) && takes_whole(stages));
         if trying > 0 {
+            self.left = self.left.and_then(|left| left.checked_sub(trying));
             if !is_fresh {
                 let begin = world.resource::<Clock>().grid.hours(from);
                 bring_tissue_to(world, begin);
@@ -168,7 +188,7 @@ impl Cover<'_> {
                 mover.start.stages().reached = if mover.start.fault.is_some() { u64::MAX } else { to };
             });
         }
-        if self.take_back(world, is_due) > 0 {
+        if self.left.is_some() && self.take_back(world, is_due) > 0 {
             let half = shorter(to - from);
             let middle = from + half - from % half;
             self.cover(world, (from, middle), false);

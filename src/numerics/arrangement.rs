@@ -4,6 +4,9 @@
 //! a tolerance become one. All results depend on the order of the input alone.
 
 use crate::numerics::polygon::{bounding_box, cross, distance, minus, nearest_on_side};
+use crate::numerics::side_tree::SideTree;
+use rstar::primitives::GeomWithData;
+use rstar::{AABB, RTree};
 
 type Segment = [[f64; 2]; 2];
 
@@ -17,23 +20,22 @@ pub struct Arrangement {
 }
 
 impl Arrangement {
-    /// Cuts `segments` at all common points; points within `tolerance` (µm) are one. The time is quadratic in their number.
+    /// Cuts `segments` at all common points; points within `tolerance` (µm) are one.
     pub fn new(segments: &[Segment], tolerance: f64) -> Self {
-        let mut points = Vec::new();
-        let ends: Vec<[u32; 2]> = segments
-            .iter()
-            .map(|&[a, b]| [merge(&mut points, a, tolerance), merge(&mut points, b, tolerance)])
-            .collect();
+        let mut points = Merged::default();
+        let ends: Vec<[u32; 2]> =
+            segments.iter().map(|&[a, b]| [points.number(a, tolerance), points.number(b, tolerance)]).collect();
         let mut cuts: Vec<Vec<(f64, u32)>> = ends.iter().map(|&[a, b]| vec![(0.0, a), (1.0, b)]).collect();
+        let tree = SideTree::of(segments.to_vec());
         for i in 0..segments.len() {
-            for j in i + 1..segments.len() {
+            for j in tree.near(&segments[i], tolerance).into_iter().filter(|j| *j > i) {
                 if !apart(&segments[i], &segments[j], tolerance) {
                     let pair = Pair { indices: [i, j], sides: [segments[i], segments[j]], ends: [ends[i], ends[j]] };
                     pair.cut(&mut points, &mut cuts, tolerance);
                 }
             }
         }
-        Self { points, segments: join(cuts) }
+        Self { points: points.points, segments: join(cuts) }
     }
 
     /// The same segments, each divided evenly into pieces no longer than `size` (µm), and these halved while they are longer than
@@ -86,11 +88,11 @@ struct Pair {
 }
 
 impl Pair {
-    fn cut(&self, points: &mut Vec<[f64; 2]>, cuts: &mut [Vec<(f64, u32)>], tolerance: f64) {
+    fn cut(&self, points: &mut Merged, cuts: &mut [Vec<(f64, u32)>], tolerance: f64) {
         let mut touched = false;
         for (one, other) in [(0, 1), (1, 0)] {
             for end in self.ends[other] {
-                let point = points[end as usize];
+                let point = points.points[end as usize];
                 if nearest_on_side(self.sides[one], point).distance <= tolerance {
                     cuts[self.indices[one]].push((share_of(self.sides[one], point), end));
                     touched = true;
@@ -103,19 +105,34 @@ impl Pair {
         let s = cross(minus(c, a), second) / divisor;
         let t = cross(minus(c, a), first) / divisor;
         if !touched && (0.0..=1.0).contains(&s) && (0.0..=1.0).contains(&t) {
-            let point = merge(points, [a[0] + s * first[0], a[1] + s * first[1]], tolerance);
+            let point = points.number([a[0] + s * first[0], a[1] + s * first[1]], tolerance);
             cuts[self.indices[0]].push((s, point));
             cuts[self.indices[1]].push((t, point));
         }
     }
 }
 
-fn merge(points: &mut Vec<[f64; 2]>, point: [f64; 2], tolerance: f64) -> u32 {
-    let near = points.iter().position(|p| distance(*p, point) <= tolerance);
-    near.unwrap_or_else(|| {
-        points.push(point);
-        points.len() - 1
-    }) as u32
+/// Points of which those that are near one another are one: the first.
+#[derive(Default)]
+struct Merged {
+    points: Vec<[f64; 2]>,
+    tree: RTree<GeomWithData<[f64; 2], u32>>,
+}
+
+impl Merged {
+    /// Number of the first point within a tolerance (µm) of one, which is added if there is none.
+    fn number(&mut self, point: [f64; 2], tolerance: f64) -> u32 {
+        // Wider than the round-off of distances and of the box itself.
+        let reach = 1.001 * tolerance + 1e-15 * (point[0].abs() + point[1].abs());
+        let around = AABB::from_corners(point.map(|x| x - reach), point.map(|x| x + reach));
+        let near = self.tree.locate_in_envelope(around).filter(|other| distance(*other.geom(), point) <= tolerance);
+        near.map(|other| other.data).min().unwrap_or_else(|| {
+            let number = self.points.len() as u32;
+            self.points.push(point);
+            self.tree.insert(GeomWithData::new(point, number));
+            number
+        })
+    }
 }
 
 fn apart(a: &Segment, b: &Segment, tolerance: f64) -> bool {

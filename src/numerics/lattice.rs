@@ -5,7 +5,8 @@ use std::collections::HashMap;
 use crate::numerics::arrangement::Arrangement;
 use crate::numerics::mesh_grading::Grading;
 use crate::numerics::planar_domain::{Outline, PlanarDomain};
-use crate::numerics::polygon::{MERGE_TOLERANCE, cross, minus, nearest_on_side, ring_contains, sides};
+use crate::numerics::polygon::{MERGE_TOLERANCE, cross, minus, nearest_on_side, sides};
+use crate::numerics::side_tree::Inside;
 
 /// Distance that the lattice keeps from border and outlines, in units of the size: far enough that no sampled edge is
 /// encroached.
@@ -21,9 +22,10 @@ pub(crate) fn filling(
     size: f64,
     grading: &Grading,
 ) -> Vec<[f64; 2]> {
-    let mut points = lattice(domain, constraints, size, grading);
+    let inside = Inside::of(domain);
+    let mut points = lattice(domain, (constraints, &inside), size, grading);
     if !domain.vertices.is_empty() {
-        points.retain(|point| !domain.contains(*point));
+        points.retain(|point| !inside.contains(*point));
         points.extend(given(domain, outlines, size));
     }
     points
@@ -46,7 +48,12 @@ fn given(domain: &PlanarDomain, outlines: &[Outline], size: f64) -> Vec<[f64; 2]
 /// Points of an equilateral lattice that keep their distance from all constraints. Where the domain is not convex the
 /// lattice also fills a box around it, so that refinement finds nothing to mend outside. Where the grading asks for a level, the
 /// points of a lattice of half the spacing are added, which holds all points of the coarser one.
-fn lattice(domain: &PlanarDomain, constraints: &Arrangement, size: f64, grading: &Grading) -> Vec<[f64; 2]> {
+fn lattice(
+    domain: &PlanarDomain,
+    (constraints, inside): (&Arrangement, &Inside),
+    size: f64,
+    grading: &Grading,
+) -> Vec<[f64; 2]> {
     let near = NearConstraints::new(constraints, size);
     let convex = is_convex(&domain.outer.points);
     let [mut low, mut high] = domain.bounding_box();
@@ -72,7 +79,7 @@ fn lattice(domain: &PlanarDomain, constraints: &Arrangement, size: f64, grading:
                 let of_coarser = level > 0 && row % 2 == 0 && column % 2 == row / 2 % 2;
                 let here = level == 0 || (0..2).all(|k| from[k] <= point[k] && point[k] < to[k]);
                 let away_from_frame = point[0] - low[0] >= CLEARANCE * size && high[0] - point[0] >= CLEARANCE * size;
-                let wanted = if convex { ring_contains(&domain.outer.points, point) } else { away_from_frame };
+                let wanted = if convex { inside.is_in_outer_ring(point) } else { away_from_frame };
                 if here && !of_coarser && wanted && !near.within(point, CLEARANCE * grading.size_at(point)) {
                     points.push(point);
                 }

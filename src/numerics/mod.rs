@@ -36,6 +36,7 @@ pub mod reaction_diffusion;
 pub mod recovery;
 pub mod runge_kutta;
 pub mod segments;
+mod side_tree;
 pub mod simplex_mesh;
 pub mod sparse;
 pub mod transient_field;

@@ -8,8 +8,8 @@ use std::f64::consts::PI;
 use rstar::RTree;
 
 use crate::numerics::polygon::{
-    MERGE_TOLERANCE, NearestOnEdge, bounding_box, cross, distance, dot, meeting_sides, minus, nearest_on_side,
-    ring_contains, sides, signed_area, touches_ring,
+    MERGE_TOLERANCE, NearestOnEdge, SideTree, bounding_box, cross, distance, dot, meeting_sides, minus,
+    nearest_on_side, ring_contains, sides, signed_area,
 };
 
 /// Why a polygon or a domain was refused.
@@ -259,9 +259,12 @@ impl PlanarDomain {
     /// two holes that overlap.
     pub fn check(&self) -> Result<(), DomainError> {
         self.check_named(&self.outer, "the outer ring".into())?;
+        let (outer, mut before) = (SideTree::of_ring(&self.outer.points), Vec::new());
         for (index, hole) in self.holes.iter().enumerate() {
             self.check_named(hole, format!("hole {index}"))?;
-            self.check_hole(index, hole)?;
+            let tree = SideTree::of_ring(&hole.points);
+            self.check_hole(index, &tree, (&outer, &before))?;
+            before.push(tree);
         }
         Ok(())
     }
@@ -276,17 +279,22 @@ impl PlanarDomain {
         Ok(())
     }
 
-    fn check_hole(&self, index: usize, hole: &Ring) -> Result<(), DomainError> {
-        let outside = |&&point: &&[f64; 2]| !ring_contains(&self.outer.points, point);
-        if let Some(&point) = hole.points.iter().find(outside) {
+    fn check_hole(
+        &self,
+        index: usize,
+        tree: &SideTree,
+        (outer, before): (&SideTree, &[SideTree]),
+    ) -> Result<(), DomainError> {
+        let points = &self.holes[index].points;
+        if let Some(&point) = points.iter().find(|point| !outer.enclose(**point)) {
             return Err(DomainError::HoleOutside { hole: index, point });
         }
-        if let Some(side) = sides(&hole.points).find(|side| touches_ring(*side, &self.outer.points)) {
+        if let Some(side) = sides(points).find(|side| outer.touch(*side)) {
             return Err(DomainError::HoleOutside { hole: index, point: side[0] });
         }
-        for (first, other) in self.holes[..index].iter().enumerate() {
-            let nested = ring_contains(&other.points, hole.points[0]) || ring_contains(&hole.points, other.points[0]);
-            if nested || sides(&hole.points).any(|side| touches_ring(side, &other.points)) {
+        for (first, other) in before.iter().enumerate().filter(|(_, other)| !tree.is_far_from(other)) {
+            let nested = other.enclose(points[0]) || tree.enclose(self.holes[first].points[0]);
+            if nested || sides(points).any(|side| other.touch(side)) {
                 return Err(DomainError::HolesOverlap { first, second: index });
             }
         }

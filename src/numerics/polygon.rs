@@ -1,5 +1,7 @@
 //! Plane geometry of closed polygons, given by their corners (µm); the last is joined to the first.
 
+pub use super::side_tree::SideTree;
+
 /// Relative length (of the bounding box's diagonal) under which two points count as one.
 pub const MERGE_TOLERANCE: f64 = 1e-10;
 
@@ -17,6 +19,11 @@ pub struct NearestOnEdge {
 /// The sides of a closed polygon, `[from, to]`.
 pub fn sides(points: &[[f64; 2]]) -> impl Iterator<Item = [[f64; 2]; 2]> + '_ {
     (0..points.len()).map(move |i| [points[i], points[(i + 1) % points.len()]])
+}
+
+/// Length of all sides of a closed polygon (µm).
+pub fn perimeter(points: &[[f64; 2]]) -> f64 {
+    sides(points).map(|[a, b]| distance(a, b)).sum()
 }
 
 /// Signed area of a closed polygon (µm²), positive if counter-clockwise.
@@ -73,9 +80,13 @@ pub(crate) fn bounding_box(points: &[[f64; 2]]) -> [[f64; 2]; 2] {
 }
 
 /// Whether a point lies inside a closed polygon (even–odd rule).
-pub(crate) fn ring_contains(points: &[[f64; 2]], [x, y]: [f64; 2]) -> bool {
-    let crosses = |[a, b]: &[[f64; 2]; 2]| (a[1] > y) != (b[1] > y) && (turn(*a, *b, [x, y]) > 0.0) == (b[1] > a[1]);
-    sides(points).filter(crosses).count() % 2 == 1
+pub(crate) fn ring_contains(points: &[[f64; 2]], point: [f64; 2]) -> bool {
+    sides(points).filter(|side| crosses_ray(side, point)).count() % 2 == 1
+}
+
+/// Whether a side crosses the ray from a point along x.
+pub(crate) fn crosses_ray(&[a, b]: &[[f64; 2]; 2], [x, y]: [f64; 2]) -> bool {
+    (a[1] > y) != (b[1] > y) && (turn(a, b, [x, y]) > 0.0) == (b[1] > a[1])
 }
 
 /// Whether a point lies inside a closed polygon or on its border, to round-off.
@@ -89,11 +100,13 @@ pub(crate) fn meeting_sides(points: &[[f64; 2]]) -> Option<(usize, usize)> {
     let all: Vec<_> = sides(points).collect();
     let [low, high] = bounding_box(points);
     let tolerance = MERGE_TOLERANCE * distance(low, high);
+    let tree = SideTree::of(all.clone());
     for (i, &a) in all.iter().enumerate() {
         if distance(a[0], a[1]) <= tolerance {
             return Some((i, i));
         }
-        for (j, &b) in all.iter().enumerate().skip(i + 1) {
+        for j in tree.near(&a, tolerance).into_iter().filter(|j| *j > i) {
+            let b = all[j];
             let meets = match (j == i + 1, i == 0 && j + 1 == all.len()) {
                 (true, _) => folds_back(a, b[1], tolerance),
                 (_, true) => folds_back(b, a[1], tolerance),
@@ -113,13 +126,8 @@ fn folds_back(side: [[f64; 2]; 2], next: [f64; 2], tolerance: f64) -> bool {
     nearest_on_side(side, next).distance <= tolerance || nearest_on_side(ahead, side[0]).distance <= tolerance
 }
 
-/// Whether a segment crosses or touches a closed polygon.
-pub(crate) fn touches_ring(side: [[f64; 2]; 2], ring: &[[f64; 2]]) -> bool {
-    let [low, high] = bounding_box(ring);
-    sides(ring).any(|other| sides_touch(side, other, MERGE_TOLERANCE * distance(low, high)))
-}
-
-fn sides_touch(a: [[f64; 2]; 2], b: [[f64; 2]; 2], tolerance: f64) -> bool {
+/// Whether two segments cross or touch.
+pub(crate) fn sides_touch(a: [[f64; 2]; 2], b: [[f64; 2]; 2], tolerance: f64) -> bool {
     let [a_low, a_high] = bounding_box(&a);
     let [b_low, b_high] = bounding_box(&b);
     if (0..2).any(|i| a_low[i] > b_high[i] + tolerance || b_low[i] > a_high[i] + tolerance) {

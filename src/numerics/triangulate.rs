@@ -15,7 +15,10 @@ use crate::numerics::lattice::filling;
 use crate::numerics::mesh_grading::Grading;
 use crate::numerics::nearest_side::NearestSide;
 use crate::numerics::planar_domain::{DomainError, Outline, PlanarDomain};
-use crate::numerics::polygon::{MERGE_TOLERANCE, bounding_box, cross, dot, minus, nearest_on_side, sides, signed_area};
+use crate::numerics::polygon::{
+    MERGE_TOLERANCE, bounding_box, cross, distance, dot, minus, nearest_on_side, sides, signed_area,
+};
+use crate::numerics::side_tree::{Inside, SideTree};
 use crate::numerics::simplex_mesh::{MeshError, SimplexMesh};
 
 /// How fine and how good the mesh shall be.
@@ -135,6 +138,10 @@ pub fn triangulate_graded(
         .flat_map(|ring| sides(&ring.points))
         .chain(outlines.iter().flat_map(|outline| sides(&outline.points)))
         .collect();
+    let along: f64 = segments.iter().map(|&[a, b]| distance(a, b) / options.size).sum();
+    if along > options.max_vertices as f64 {
+        return Err(TriangulationError::TooManyVertices { limit: options.max_vertices, size: options.size });
+    }
     let constraints = Arrangement::new(&segments, MERGE_TOLERANCE * domain.diameter())
         .sampled(options.size, |point| grading.size_at(point));
     let (vertices, triangles) = refined_triangles(domain, (&constraints, outlines), options, grading)?;
@@ -278,6 +285,7 @@ fn kept_and_renumbered(
     let [low, high] = domain.bounding_box();
     let scale = [0, 1].map(|i| f64::from(u32::MAX) / (high[i] - low[i]));
     let code = |p: [f64; 2]| morton([0, 1].map(|i| ((p[i] - low[i]) * scale[i]) as u32));
+    let inside = Inside::of(domain);
     let centroid = |t: &[u32; 3]| {
         let [a, b, c] = t.map(|v| vertices[v as usize]);
         [(a[0] + b[0] + c[0]) / 3.0, (a[1] + b[1] + c[1]) / 3.0]
@@ -285,7 +293,7 @@ fn kept_and_renumbered(
     let mut kept: Vec<(u64, [u32; 3])> = triangles
         .iter()
         .map(|triangle| (centroid(triangle), triangle))
-        .filter(|(centre, _)| domain.contains(*centre))
+        .filter(|(centre, _)| inside.contains(*centre))
         .map(|(centre, triangle)| (code(centre), *triangle))
         .collect();
     kept.sort_unstable();
@@ -326,8 +334,9 @@ fn regions(mesh: &SimplexMesh<2>, outlines: &[Outline]) -> Result<Vec<Vec<u32>>,
     let mut regions = Vec::with_capacity(outlines.len());
     for (index, outline) in outlines.iter().enumerate() {
         let [low, high] = outline.bounding_box();
+        let tree = SideTree::of_ring(&outline.points);
         let in_box = |p: [f64; 2]| (0..2).all(|i| low[i] <= p[i] && p[i] <= high[i]);
-        let inside = |cell: &u32| in_box(centroids[*cell as usize]) && outline.contains(centroids[*cell as usize]);
+        let inside = |cell: &u32| in_box(centroids[*cell as usize]) && tree.enclose(centroids[*cell as usize]);
         let cells: Vec<u32> = (0..mesh.cell_count() as u32).filter(inside).collect();
         let area: f64 = cells.iter().map(|&cell| mesh.volume(mesh.vertices(), cell as usize)).sum();
         let wanted = signed_area(&outline.points).abs();

@@ -1,7 +1,7 @@
 //! Which closed line is the outer border, and what the sides are called by the lines along them.
 
 use super::{Found, FoundRing};
-use crate::numerics::polygon::{contains_or_touches, distance_to_segment, signed_area};
+use crate::numerics::polygon::{SideTree, contains_or_touches, signed_area};
 
 /// Lines name a side up to this share of the outline's extent away from it.
 const REACH: f64 = 1e-5;
@@ -24,15 +24,16 @@ pub(super) fn named(found: Found) -> Result<Vec<FoundRing>, String> {
         return Err(format!("closed lines beside each other: the one through ({x}, {y}) lies outside of the largest"));
     }
     let reach = REACH * extent(&outer.points);
+    let pieces = |line: &[[f64; 2]]| SideTree::of(line.windows(2).map(|ends| [ends[0], ends[1]]).collect());
+    let trees: Vec<_> = lines.iter().map(|(name, line)| (name, pieces(line))).collect();
     for ring in &mut rings {
         let count = ring.points.len();
         for side in 0..count {
             let (a, b) = (ring.points[side], ring.points[(side + 1) % count]);
             let middle = [0.5 * (a[0] + b[0]), 0.5 * (a[1] + b[1])];
-            let along =
-                |line: &&(String, Vec<[f64; 2]>)| [a, middle, b].iter().all(|point| is_on(&line.1, *point, reach));
-            if let Some((name, _)) = lines.iter().find(along) {
-                ring.names[side] = Some(name.clone());
+            let along = |line: &SideTree| [a, middle, b].iter().all(|point| line.pass(*point, reach));
+            if let Some((name, _)) = trees.iter().find(|(_, line)| along(line)) {
+                ring.names[side] = Some((*name).clone());
             }
         }
     }
@@ -64,10 +65,6 @@ fn extent(points: &[[f64; 2]]) -> f64 {
         values.clone().fold(f64::NEG_INFINITY, f64::max) - values.fold(f64::INFINITY, f64::min)
     };
     span(0).max(span(1))
-}
-
-fn is_on(line: &[[f64; 2]], point: [f64; 2], reach: f64) -> bool {
-    line.windows(2).any(|ends| distance_to_segment(point, [ends[0], ends[1]]) <= reach)
 }
 
 #[cfg(test)]

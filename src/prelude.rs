@@ -24,6 +24,7 @@ pub use crate::model::health::{Counters, Health};
 pub use crate::model::keep::{Damage, Keep, KeptBytes};
 pub use crate::model::material_law::{MaterialChoice, MaterialLaw, Materials};
 pub use crate::model::mechanism::{Demands, Facts, InstallError, Law, Mechanism, ModelBuilder, Roster, unknown_name};
+pub use crate::model::mesh_extent::MeshExtent;
 pub use crate::model::plan::{Each, Plan, Work};
 pub use crate::model::quantity::{
     Angle, AngularSpeed, Area, Concentration, ConcentrationGradient, Diffusivity, Drag, ElectricField,

@@ -35,10 +35,10 @@ const MOST_LEVELS: usize = 65;
 impl Mechanism for Cues {
     const NAME: &'static str = "cues";
 
-    fn check(&self, _facts: &Facts) -> Violations {
+    fn check(&self, facts: &Facts) -> Violations {
         let mut wrong = Violations::new();
         for (name, cue) in &self.0 {
-            wrong.extend_under(&format!("/{name}"), cue.check());
+            wrong.extend_under(&format!("/{name}"), cue.check(&facts.mesh_extent));
         }
         wrong
     }
@@ -316,7 +316,7 @@ fn report(world: &mut World, (name, cue): (&str, &Cue), field: &FieldPath) {
 }
 
 fn failed(cue: &str, error: impl std::fmt::Display) -> InstallError {
-    InstallError::Solve(format!("cue `{cue}` (eq. 2): {error}"))
+    InstallError::Solve(format!("cue `{cue}` (eq. 2, /cues/{cue}): {error}"))
 }
 
 /// Edges may be this much longer than advised: meshes come out a little coarser than asked for.

@@ -108,6 +108,8 @@ keys! {
     }
 }
 
+/// √(D/k) over the length of the tissue's border, at most.
+const LONGEST_DECAY: f64 = 1e3;
 /// Default of `time_tolerance`.
 const TIME_TOLERANCE: f64 = 1e-4;
 /// A step is at most an eighth of the time between two kinks.
@@ -117,8 +119,9 @@ const MOST_TIMES: usize = 513;
 
 impl Cue {
     /// What a schema cannot say.
-    pub(super) fn check(&self) -> Violations {
+    pub(super) fn check(&self, extent: &MeshExtent) -> Violations {
         let mut wrong = Violations::new();
+        self.check_decay_length(extent.border, &mut wrong);
         wrong.demand(!self.sources.is_empty(), "/sources", || {
             "a cue needs at least one source, such as {\"disc\": {\"centre\": [400, 540], \"radius\": 50}}".into()
         });
@@ -138,6 +141,20 @@ impl Cue {
             }
         }
         wrong
+    }
+
+    /// Where D ∇²c is so much larger than k c that their sum has lost the latter to round-off, no equilibrium is found.
+    fn check_decay_length(&self, border: f64, wrong: &mut Violations) {
+        let most = self.degradation.0 * (LONGEST_DECAY * border).powi(2);
+        wrong.demand(border == 0.0 || self.diffusion.0 <= most, "/diffusion", || {
+            format!(
+                "{} and a degradation of {} make a decay length of {:.1e} um, over {LONGEST_DECAY} times the border of the tissue, in which the \
+                 cue is the same everywhere; a diffusion of at most {most:.1e} um2/h is allowed with that degradation",
+                self.diffusion,
+                self.degradation,
+                (self.diffusion.0 / self.degradation.0).sqrt(),
+            )
+        });
     }
 
     fn check_time(&self, wrong: &mut Violations) {

@@ -210,7 +210,10 @@ impl Matrix {
         };
         let options = LoadPathOptions { tolerance: self.tolerance.0, interpolation, ..LoadPathOptions::default() };
         let path = LoadPath::solve(&body, &options).map_err(|error| {
-            InstallError::Solve(format!("the matrix (eq. 3) has no path to its full load: {error}{}", remedy(self)))
+            InstallError::Solve(format!(
+                "the matrix (eq. 3, /matrix) has no path to its full load: {error}{}",
+                remedy(self)
+            ))
         })?;
         let mut farthest = vec![0.0; body.unknowns()];
         let largest = self.load.largest();
@@ -225,7 +228,8 @@ impl Mechanism for Matrix {
 
     fn check(&self, facts: &Facts) -> Violations {
         let mut wrong = Violations::new();
-        for name in self.edges().keys().filter(|name| !facts.edges.contains(name)) {
+        let is_missing = |name: &&String| !facts.edges.is_empty() && !facts.edges.contains(name);
+        for name in self.edges().keys().filter(is_missing) {
             wrong.push("/motion", unknown_name("edge", name, &facts.edges));
         }
         if let Ok(lame) = self.lame()
@@ -238,6 +242,7 @@ impl Mechanism for Matrix {
             format!("{} times and {} loads: give as many loads as times, two or more", times.len(), loads.len())
         });
         wrong.demand(times.windows(2).all(|w| w[0].0 < w[1].0), "/load/times", || "times must ascend".into());
+        self.mesh_size.iter().for_each(|size| facts.mesh_extent.demand(*size, "/mesh_size", &mut wrong));
         wrong.demand(loads.iter().all(|s| (0.0..=1.0).contains(&s.0)), "/load/loads", || {
             "each load lies in [0, 1]; larger motion goes into `motion`".into()
         });
@@ -346,7 +351,7 @@ fn remedy(matrix: &Matrix) -> &'static str {
 }
 
 fn solve_error(error: impl std::fmt::Display) -> InstallError {
-    InstallError::Solve(format!("the matrix (eq. 3): {error}"))
+    InstallError::Solve(format!("the matrix (eq. 3, /matrix): {error}"))
 }
 
 fn refuse(edge: &str, message: &str) -> InstallError {

@@ -57,7 +57,7 @@ impl TimeGrid {
 
     /// The nearest instant at which a birth may happen, in ticks.
     pub fn nearest_birth(&self, hours: f64) -> u64 {
-        self.nearest(hours).div_ceil(BIRTH_TICKS) * BIRTH_TICKS
+        self.nearest(hours).div_ceil(BIRTH_TICKS).saturating_mul(BIRTH_TICKS)
     }
 }
 

@@ -10,6 +10,7 @@ use super::health::Health;
 use super::keep::Keep;
 use super::kept::KeptState;
 use super::material_law::{MaterialLaw, Materials};
+use super::mesh_extent::MeshExtent;
 use super::plan::Plan;
 use super::random::Stream;
 use super::schedule::{Motion, Phase, Schedules, Slot, Term};
@@ -82,12 +83,14 @@ pub enum InstallError {
 pub struct Facts {
     /// Names of the populations.
     pub populations: Vec<String>,
-    /// Names of the tissue's edges.
+    /// Names of the tissue's edges; none if the tissue itself is wrong, and what it is not known.
     pub edges: Vec<String>,
     /// The blocks of all mechanisms in the scene, as JSON.
     pub blocks: serde_json::Map<String, Value>,
     /// Length of the run (h).
     pub duration: f64,
+    /// How large a mesh of the tissue may be.
+    pub mesh_extent: MeshExtent,
     /// The laws of material the program has.
     pub materials: Materials,
 }

@@ -17,6 +17,7 @@ pub mod kept;
 pub mod keys;
 pub mod material_law;
 pub mod mechanism;
+pub mod mesh_extent;
 mod movers;
 pub mod observables;
 mod open_end;

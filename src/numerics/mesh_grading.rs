@@ -74,19 +74,24 @@ impl Grading {
     /// Asks for one level more in the cells (at `coordinates`, µm) whose error is above the tolerance, `most` levels at most. Returns
     /// whether anything is asked for that was not before.
     pub fn refine(&mut self, mesh: &SimplexMesh<2>, errors: &[f64], tolerance: f64, most: u8) -> bool {
-        let corners = |cell: usize| mesh.cell(cell).iter().map(|&v| mesh.vertices()[v as usize]);
-        let centroid = |cell: usize| {
-            let sum = corners(cell).fold([0.0; 2], |sum, x| [sum[0] + x[0], sum[1] + x[1]]);
-            sum.map(|x| x / 3.0)
-        };
         let wrong = errors.iter().enumerate().filter(|(_, error)| **error > tolerance);
         let wanted: Vec<(usize, u8)> =
-            wrong.map(|(cell, _)| (cell, (self.level(centroid(cell)) + 1).min(most.min(MOST_LEVELS)))).collect();
+            wrong.map(|(cell, _)| (cell, (self.level(centroid(mesh, cell)) + 1).min(most.min(MOST_LEVELS)))).collect();
         let before = self.count();
         for (cell, level) in wanted {
-            (1..=level).for_each(|level| corners(cell).for_each(|corner| self.ask(level, corner)));
+            (1..=level).for_each(|level| corners(mesh, cell).for_each(|corner| self.ask(level, corner)));
         }
         self.count() > before
+    }
+
+    /// About how many vertices there will be once all errors are within the tolerance, or edges halved `most` times: half a vertex a cell, four
+    /// cells for one where an edge is halved, errors as long as edges.
+    pub fn vertices_to_come(&self, mesh: &SimplexMesh<2>, errors: &[f64], tolerance: f64, most: u8) -> f64 {
+        let vertices = |(cell, error): (usize, &f64)| {
+            let left = most.min(MOST_LEVELS).saturating_sub(self.level(centroid(mesh, cell)));
+            0.5 * 4f64.powf((error / tolerance).log2().ceil().clamp(0.0, f64::from(left)))
+        };
+        errors.iter().enumerate().map(vertices).sum()
     }
 
     /// Asks for shorter edges around a corner with the angle ω > π inside: h = H (r/R)^(1−μ) at the distance r ≤ R, to within a factor of two, down to h = r,
@@ -128,6 +133,15 @@ impl Grading {
         let around = (-1..=1).flat_map(|di| (-1..=1).map(move |dj| [i + di, j + dj]));
         self.squares[usize::from(level) - 1].extend(around);
     }
+}
+
+fn corners(mesh: &SimplexMesh<2>, cell: usize) -> impl Iterator<Item = [f64; 2]> {
+    mesh.cell(cell).iter().map(|&vertex| mesh.vertices()[vertex as usize])
+}
+
+fn centroid(mesh: &SimplexMesh<2>, cell: usize) -> [f64; 2] {
+    let sum = corners(mesh, cell).fold([0.0; 2], |sum, x| [sum[0] + x[0], sum[1] + x[1]]);
+    sum.map(|x| x / 3.0)
 }
 
 /// The estimate η of every cell (dimensionless): `values` c and recovered `gradients` G c one entry a vertex, `decay_length` ℓ in µm.

@@ -6,6 +6,7 @@
 
 use super::output::{WriteError, write_and_keep_previous};
 use crate::model::keep::{Damage, Keep, KeptBytes};
+use crate::scenario::read::NO_FILE;
 use std::fs::{self, File};
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
@@ -141,7 +142,7 @@ impl Checkpoint {
     /// A file that cannot be read, or whose content [`Self::from_bytes`] refuses.
     pub fn read(path: &Path) -> Result<Self, CheckpointError> {
         if !fs::metadata(path)?.is_file() {
-            return Err(io::Error::other("it is no file to be read from its beginning to its end").into());
+            return Err(io::Error::other(format!("it is {NO_FILE}")).into());
         }
         let mut file = File::open(path)?;
         let length = file.metadata()?.len();

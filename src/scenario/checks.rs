@@ -100,11 +100,7 @@ fn check_tissue(tissue: &Tissue, violations: &mut Violations) {
             });
         }
     }
-    let vertices = tissue.expected_vertices();
-    violations.demand(vertices <= tissue.max_vertices as f64, "/tissue/mesh_size", || {
-        let (size, most) = (tissue.mesh_size, tissue.max_vertices);
-        format!("triangles of {size} would need about {vertices:.1e} vertices; max_vertices is {most}")
-    });
+    tissue.mesh_extent().demand(tissue.mesh_size, "/tissue/mesh_size", violations);
 }
 
 fn check_named_ring(ring: &Ring, pointer: &str, violations: &mut Violations) {

@@ -1,5 +1,6 @@
 //! A scenario reads files in its own folder, and nothing else.
 
+use super::read::NO_FILE;
 use std::path::{Component, Path, PathBuf};
 
 /// Where a file lies that a scenario in `folder` names, links followed if it is there.
@@ -20,9 +21,7 @@ pub fn inside(folder: &Path, file: &str) -> Result<PathBuf, String> {
         (Ok(path), Ok(folder)) if !path.starts_with(&folder) => {
             Err(format!("{file}: a link that leads out of the folder of the scenario"))
         }
-        (Ok(path), _) if !path.is_file() && !path.is_dir() => {
-            Err(format!("{file}: no file to be read from its beginning to its end"))
-        }
+        (Ok(path), _) if !path.is_file() && !path.is_dir() => Err(format!("{file}: {NO_FILE}")),
         _ => Ok(path),
     }
 }

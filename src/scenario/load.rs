@@ -15,7 +15,7 @@ use super::merge::{idle_removals, merge, strip_nulls};
 use super::outline_file::take_in;
 use super::overrides;
 use super::read::read_file;
-use super::scene::Scene;
+use super::scene::{Scene, Tissue};
 use super::schema::{BlockSchema, full_schema};
 use super::schema_view::show;
 use super::schema_walk::walk;
@@ -301,7 +301,7 @@ impl Draft {
         blocks: &[BlockSchema],
         broken: &BTreeSet<String>,
     ) {
-        let facts = facts(scene, &self.document);
+        let facts = facts(scene, &self.document, broken);
         let outline = (!broken.contains("tissue")).then_some(&scene.tissue.outline);
         for block in blocks {
             let Some((check, value)) = block.check.as_ref().zip(mechanisms.get(block.name)) else { continue };
@@ -316,14 +316,19 @@ impl Draft {
     }
 }
 
-/// What a block's check may know of the scene; the laws of material are the roster's to add. Names of blocks that are broken still
-/// count.
-pub fn facts(scene: &Scene, document: &Value) -> Facts {
+/// What a block's check may know of the scene; the laws of material are the roster's to add. Names of populations and of blocks that are
+/// `broken` still count; of a tissue that is, nothing is known, since what stands in its place is the default.
+pub fn facts(scene: &Scene, document: &Value, broken: &BTreeSet<String>) -> Facts {
+    let written = document.get("populations").and_then(Value::as_object);
+    let of_broken = || written.into_iter().flat_map(Map::keys).cloned().collect();
+    let is_broken = |key: &str| broken.contains(key);
+    let tissue = (!is_broken("tissue")).then_some(&scene.tissue);
     Facts {
-        populations: scene.populations.keys().cloned().collect(),
-        edges: scene.tissue.outline.edge_names(),
+        populations: if is_broken("populations") { of_broken() } else { scene.populations.keys().cloned().collect() },
+        edges: tissue.map(|tissue| tissue.outline.edge_names()).unwrap_or_default(),
         blocks: document.as_object().cloned().unwrap_or_default(),
         duration: scene.time.duration.0,
+        mesh_extent: tissue.map(Tissue::mesh_extent).unwrap_or_default(),
         ..Facts::default()
     }
 }

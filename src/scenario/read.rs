@@ -14,6 +14,9 @@ use crate::model::violation::pointer_token;
 /// The largest file read, in bytes.
 pub const LARGEST_FILE: u64 = 16 << 20;
 
+/// What is said of a pipe, a device or a folder in the place of a file.
+pub const NO_FILE: &str = "no file to be read from its beginning to its end";
+
 /// Why a file or a text gave no JSON value. Nesting deeper than 128 levels counts as [`ReadError::NotJson`].
 #[derive(Debug, Error)]
 pub enum ReadError {
@@ -30,7 +33,7 @@ pub enum ReadError {
         path: PathBuf,
     },
     /// The path is a pipe or a device.
-    #[error("{}: no file to be read from its beginning to its end", path.display())]
+    #[error("{}: {NO_FILE}", path.display())]
     NoFile {
         /// The path.
         path: PathBuf,

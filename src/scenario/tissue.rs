@@ -5,9 +5,10 @@ use serde::{Deserialize, Serialize};
 
 use super::outline_file::FiledOutline;
 use crate::keys;
+use crate::model::mesh_extent::MeshExtent;
 use crate::model::quantity::{Angle, Factor, Length};
 use crate::model::shape::{Point, coordinates};
-use crate::numerics::polygon::signed_area;
+use crate::numerics::polygon::{perimeter, signed_area};
 
 keys! {
     /// The tissue at rest and its mesh.
@@ -35,7 +36,7 @@ keys! {
     /// Local refinement of the mesh: edges are halved where a cue's gradient is too wrong, tissue at rest. Ours.
     pub struct Refinement {
         /// Largest estimate |∇c_h − G|/(|G| + c/ℓ) that is left in a cell, ∇c_h its own gradient, G the recovered one (whose error is about the square).
-        #[schemars(extend("exclusiveMinimum" = 0.0, "x-typical" = [0.02, 0.3]))]
+        #[schemars(extend("minimum" = 0.001, "x-typical" = [0.02, 0.3]))]
         pub tolerance: Factor = Factor(0.1),
         /// How often an edge may be halved.
         #[schemars(extend("minimum" = 1, "maximum" = 10))]
@@ -90,13 +91,20 @@ pub enum Outline {
     },
 }
 
-/// Vertices per area over h², for triangles near the equilateral one: 2/√3.
-const VERTICES_PER_SQUARE: f64 = 1.154_700_538_379_251_7;
-
 impl Tissue {
     /// About how many vertices a mesh of the wanted size has.
     pub fn expected_vertices(&self) -> f64 {
-        VERTICES_PER_SQUARE * self.outline.area() / self.mesh_size.0.powi(2)
+        self.mesh_extent().vertices_at(self.mesh_size)
+    }
+
+    /// What the number of vertices of a mesh depends on, and how many there may be.
+    pub fn mesh_extent(&self) -> MeshExtent {
+        let rings = std::iter::once(self.outline.outer()).chain(self.outline.holes());
+        MeshExtent {
+            area: self.outline.area(),
+            border: rings.map(|ring| perimeter(&ring.coordinates())).sum(),
+            max_vertices: self.max_vertices,
+        }
     }
 }
 

@@ -28,6 +28,7 @@ use crate::numerics::turning::derived;
 use crate::scenario::load::{Loaded, facts};
 use crate::scenario::scene::{self, Scene};
 use bevy_ecs::prelude::{IntoScheduleConfigs, World};
+use std::collections::BTreeSet;
 
 /// Why a scene could not be built.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -94,7 +95,8 @@ pub(super) fn assemble(loaded: &Loaded, roster: &Roster, shelf: &Shelf) -> Resul
 
 /// Reads the blocks in the roster's order and lets each check itself against the scene.
 fn read_blocks(loaded: &Loaded, roster: &Roster) -> Result<Vec<Chosen>, AssemblyError> {
-    let facts = Facts { materials: roster.materials().clone(), ..facts(&loaded.scene, &loaded.merged) };
+    let facts =
+        Facts { materials: roster.materials().clone(), ..facts(&loaded.scene, &loaded.merged, &BTreeSet::new()) };
     let mut chosen = Vec::new();
     let mut wrong = Vec::new();
     for (slot, entry) in roster.entries.iter().enumerate() {
@@ -179,6 +181,9 @@ fn insert_tissue(world: &mut World, loaded: &Loaded, chosen: &[Chosen]) -> Resul
     Ok(())
 }
 
+/// By how much more vertices than there may be must be expected for a mesh not to be begun: errors may fall faster than the length of edges.
+const OVERESTIMATE: f64 = 4.0;
+
 /// How the tissue of a scene is meshed.
 struct Meshing<'a> {
     scene: &'a Scene,
@@ -205,6 +210,14 @@ impl Meshing<'_> {
             let mut any = false;
             for Chosen { name, law, .. } in self.chosen {
                 let errors = law.mesh_errors(&tissue).map_err(|error| refused(name, error))?;
+                let expected = grading.vertices_to_come(&tissue.mesh, &errors, refinement.tolerance.0, most);
+                if expected > OVERESTIMATE * keys.max_vertices as f64 {
+                    let (tolerance, most) = (refinement.tolerance, keys.max_vertices);
+                    let words = format!(
+                        "errors within {tolerance} would need about {expected:.1e} vertices; max_vertices is {most}"
+                    );
+                    return Err(AssemblyError::at("/tissue/refinement/tolerance", words));
+                }
                 any |= grading.refine(&tissue.mesh, &errors, refinement.tolerance.0, most);
             }
             if !any {
@@ -229,6 +242,9 @@ impl Meshing<'_> {
                 &self.named[outline].0,
                 format!("lies outside the tissue at ({:.4}, {:.4}) um", point[0], point[1]),
             ),
+            TriangulationError::TooManyVertices { .. } if grading.finest() > 0 && keys.refinement.is_some() => {
+                AssemblyError::at("/tissue/refinement/tolerance", format!("{error}; a larger tolerance asks for fewer"))
+            }
             other => AssemblyError::at("/tissue", other.to_string()),
         })
     }

@@ -42,7 +42,7 @@ pub fn taken_over(path: &LoadPath, from: &Tissue, tissue: &Tissue) -> Result<Loa
         let moved = Configuration::of_vertices(displaced.map(|(x, u)| [x[0] + u[0], x[1] + u[1]]).collect());
         if let Some(defect) = moved.defect(&tissue.mesh) {
             return Err(InstallError::Solve(format!(
-                "the matrix (eq. 3) was solved on a mesh of its own, whose displacements do not fit the tissue's: at load {:.3} {defect}; a \
+                "the matrix (eq. 3, /matrix) was solved on a mesh of its own, whose displacements do not fit the tissue's: at load {:.3} {defect}; a \
                  finer /matrix/mesh_size is needed",
                 level.parameter
             )));

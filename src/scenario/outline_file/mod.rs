@@ -10,7 +10,7 @@ mod svg;
 
 use super::folder::inside;
 use super::merge::strip_nulls;
-use super::read::read_text;
+use super::read::{NO_FILE, read_text};
 use crate::keys;
 use crate::model::quantity::Length;
 use crate::model::violation::Violation;
@@ -149,7 +149,7 @@ fn read_inside(folder: &Path, file: &str) -> Result<String, String> {
         return Err(format!("{file}: no such file beside the scenario"));
     }
     if !path.is_file() {
-        return Err(format!("{file}: no file to be read from its beginning to its end"));
+        return Err(format!("{file}: {NO_FILE}"));
     }
     read_text(&path).map_err(|error| error.to_string())
 }

@@ -14,7 +14,7 @@
 
 use super::shaft_index::{Asking, Search, ShaftIndex, ShaftScene};
 use crate::numerics::contact_integral::Felt;
-use crate::numerics::segments::{ContactPull, Contacts, Touch};
+use crate::numerics::segments::{ContactPull, Contacts, Segments, Touch};
 use crate::prelude::*;
 use std::collections::BTreeMap;
 
@@ -162,19 +162,17 @@ fn attract(
     mut cones: Cones,
 ) {
     let contact = ContactLaw::from(&law.0);
-    let asking = Asking::all(&cones);
-    counters.neighbour_queries += asking.len() as u64;
-    let pulls = index.for_each(&scene, &asking, |contacts: &mut Contacts<2>, cone, segments| {
+    let feel = |contacts: &mut Contacts<2>, cone: &Asking, segments: &Segments<2>| {
         let sum = cone.sum(contacts, segments, (&contact.felt, &contact), table.row(cone.population));
         sum / sum.norm().max(1.0)
-    });
-    cones.add_pulls(&pulls, law.weight.0);
+    };
+    let asked = index.for_each(&scene, &mut cones, feel, |spring, pull| spring.pull += pull * law.weight.0);
+    counters.neighbour_queries += asked as u64;
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::numerics::segments::Segments;
 
     fn law() -> ContactLaw {
         ContactLaw::from(&Fasciculation::default())

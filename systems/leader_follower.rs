@@ -13,7 +13,7 @@
 
 use super::shaft_index::{Asking, Search, ShaftIndex, ShaftScene};
 use crate::numerics::contact_integral::Felt;
-use crate::numerics::segments::{ContactPull, Contacts, Touch};
+use crate::numerics::segments::{ContactPull, Contacts, Segments, Touch};
 use crate::prelude::*;
 use std::collections::BTreeMap;
 
@@ -112,12 +112,12 @@ fn slow_leaders(
     mut cones: Cones,
 ) {
     let ahead = Ahead::from(&law.0);
-    let factors = index.for_each(&scene, &Asking::all(&cones), |contacts: &mut Contacts<2>, cone, segments| {
+    let feel = |contacts: &mut Contacts<2>, cone: &Asking, segments: &Segments<2>| {
         let inside = cells.0[cone.site.cell as usize];
         let felt = if inside { cone.sum(contacts, segments, (&ahead.felt, &ahead), &[1.0]).x } else { 0.0 };
         factor(law.leader_speed.0, inside, felt)
-    });
-    cones.apply(&factors, |spring, factor| spring.speed_factor *= factor);
+    };
+    index.for_each(&scene, &mut cones, feel, |spring, factor| spring.speed_factor *= factor);
 }
 
 /// An axon alone leads.
@@ -130,7 +130,6 @@ fn slow_alone(law: Res<Law<LeaderFollower>>, cells: Res<DecisionCells>, mut cone
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::numerics::segments::Segments;
 
     fn ahead(a: [f64; 2], b: [f64; 2], heading: [f64; 2]) -> f64 {
         let law = Ahead::from(&LeaderFollower::default());

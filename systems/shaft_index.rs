@@ -66,7 +66,7 @@ pub enum Search {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 struct Seat {
     square: Square,
-    /// Its place among those that ask.
+    /// Its place among all cones.
     cone: u32,
     /// The bit of the part of the square.
     part: u16,
@@ -85,6 +85,9 @@ struct Group<'a> {
     /// Where among the [noted](Places::noted) parts is what may be near them.
     near: Range<usize>,
 }
+
+/// What a thread works on: cones that ask, segments about them, the parts that these are of, and what a mechanism needs.
+type Desk<S> = (Vec<Asking>, Segments<2>, Vec<Part>, S);
 
 /// The neighbour index over all shaft segments.
 #[derive(Debug, Resource, Default)]
@@ -129,40 +132,41 @@ impl ShaftIndex {
         true
     }
 
-    /// Calls `act` for each cone with all segments that may lie within `reach` of it, those of its own shaft included, and
-    /// returns what it makes of them, in the order of the cones. The order of segments is that of their vertices; `S` is what a
+    /// Calls `act` for each growing cone with all segments that may lie within `reach` of it, those of its own shaft included, and
+    /// `write` with what it makes of them; returns the number of cones. The order of segments is that of their vertices; `S` is what a
     /// thread works with.
     pub fn for_each<S: Default + Send, T: Send>(
         &mut self,
         scene: &ShaftScene,
-        cones: &[Asking],
+        cones: &mut Cones,
         act: impl Fn(&mut S, &Asking, &Segments<2>) -> T + Sync,
-    ) -> Vec<T> {
+        write: impl Fn(&mut SpringState, T),
+    ) -> usize {
         let side = self.side();
-        let seat = |(cone, i): (&Asking, u32)| {
+        let mut order = cones.collect(|cone, _| {
             let at = scene.reference(cone.site);
-            Seat { square: square(at, side), part: part_of(at, side), cone: i }
-        };
-        let mut order: Vec<Seat> = cones.par_iter().zip(0..cones.len() as u32).map(seat).collect();
+            Seat { square: square(at, side), part: part_of(at, side), cone: cone.index as u32 }
+        });
         order.par_sort_unstable();
         self.prepare(scene, &order);
-        let mut found: Vec<Option<T>> = std::iter::repeat_with(|| None).take(cones.len()).collect();
         for batch in order.chunks(BATCH) {
             let groups = self.place(scene, batch);
-            let serve = |(segments, met, work): &mut (Segments<2>, Vec<Part>, S), task: &[Group]| -> Vec<_> {
+            let columns = cones.columns();
+            let serve = |(asking, segments, met, work): &mut Desk<S>, task: &[Group]| -> Vec<_> {
                 let mut found = Vec::with_capacity(TASK);
                 for group in task {
-                    self.gather(group, cones, (segments, met));
-                    let act = |seat: &Seat| (seat.cone, act(work, &cones[seat.cone as usize], segments));
-                    found.extend(group.seats.iter().map(act));
+                    asking.clear();
+                    asking.extend(group.seats.iter().map(|seat| Asking::of(columns.at(seat.cone as usize))));
+                    self.gather(&group.near, asking, (segments, met));
+                    found.extend(asking.iter().map(|cone| (cone.index as usize, act(work, cone, segments))));
                 }
                 found
             };
             let tasks = groups.par_chunk_by(|a, b| a.task == b.task).map_init(Default::default, serve);
-            let tasks: Vec<Vec<(u32, T)>> = tasks.collect();
-            tasks.into_iter().flatten().for_each(|(i, value)| found[i as usize] = Some(value));
+            let tasks: Vec<Vec<(usize, T)>> = tasks.collect();
+            cones.apply_at(tasks.into_iter().flatten(), &write);
         }
-        found.into_iter().flatten().collect()
+        order.len()
     }
 
     /// Side of a square (µm, reference): no shorter than a segment, which would lie in too many.
@@ -235,12 +239,12 @@ impl ShaftIndex {
         made.into_iter().for_each(|(square, list)| *self.squares.make(square) = list);
     }
 
-    /// The segments of what may be near that come near any cone of a group.
-    fn gather(&self, group: &Group, cones: &[Asking], (segments, met): (&mut Segments<2>, &mut Vec<Part>)) {
-        let positions = || group.seats.iter().map(|seat| cones[seat.cone as usize].position.xy());
+    /// The segments of what may be near that come near any of some cones.
+    fn gather(&self, near: &Range<usize>, cones: &[Asking], (segments, met): (&mut Segments<2>, &mut Vec<Part>)) {
+        let positions = || cones.iter().map(|cone| cone.position.xy());
         let low = positions().fold(Vector2::repeat(f64::INFINITY), |m, x| m.inf(&x)).add_scalar(-self.reach);
         let high = positions().fold(Vector2::repeat(f64::NEG_INFINITY), |m, x| m.sup(&x)).add_scalar(self.reach);
-        let near = self.places.noted(&group.near).iter().copied();
+        let near = self.places.noted(near).iter().copied();
         segments.clear();
         match self.search {
             Search::All => {

@@ -11,7 +11,7 @@
 
 use super::shaft_index::{Asking, Search, ShaftIndex, ShaftScene};
 use crate::numerics::contact_integral::Felt;
-use crate::numerics::segments::{ContactPull, Contacts, Touch};
+use crate::numerics::segments::{ContactPull, Contacts, Segments, Touch};
 use crate::prelude::*;
 
 keys! {
@@ -63,17 +63,16 @@ impl<const D: usize> ContactPull<D> for Repulsion {
 
 fn repel(law: Res<Law<StericRepulsion>>, mut index: ResMut<ShaftIndex>, scene: ShaftScene, mut cones: Cones) {
     let contact = Repulsion::below(law.distance.0);
-    let pulls = index.for_each(&scene, &Asking::all(&cones), |contacts: &mut Contacts<2>, cone, segments| {
+    let feel = |contacts: &mut Contacts<2>, cone: &Asking, segments: &Segments<2>| {
         let sum = cone.sum(contacts, segments, (&contact.felt, &contact), &[1.0]);
         sum / sum.norm().max(1.0)
-    });
-    cones.add_pulls(&pulls, law.weight.0);
+    };
+    index.for_each(&scene, &mut cones, feel, |spring, pull| spring.pull += pull * law.weight.0);
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::numerics::segments::Segments;
 
     fn pull(a: Vector3<f64>, b: Vector3<f64>) -> Vector3<f64> {
         let law = Repulsion::below(3.0);

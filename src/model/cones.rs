@@ -63,13 +63,44 @@ impl Cones<'_, '_> {
     }
 
     /// What `look` sees of each growing cone, in their order.
-    pub fn collect<T>(&self, look: impl Fn(Cone, &SpringState) -> T) -> Vec<T> {
-        let cones = self.query.iter().enumerate().filter(|(_, (_, status, ..))| **status == Status::Growing);
-        cones
-            .map(|(index, (identity, _, site, position, receptors, spring))| {
-                look(Cone { index, identity, site: *site, position: position.0, receptors: &receptors.0 }, spring)
-            })
-            .collect()
+    pub fn collect<T: Send>(&self, look: impl Fn(Cone, &SpringState) -> T + Sync) -> Vec<T> {
+        let columns = self.columns();
+        let mut seen = Vec::new();
+        for (first, table) in &columns.0 {
+            let growing = table.1.par_iter().enumerate().with_min_len(CHUNK);
+            let growing = growing.filter(|(_, status)| **status == Status::Growing);
+            seen.par_extend(growing.map(|(i, _)| {
+                let (cone, spring) = of_table(*first, table, i);
+                look(cone, spring)
+            }));
+        }
+        seen
+    }
+
+    /// All cones, to be looked at by place.
+    pub fn columns(&self) -> ConeColumns<'_> {
+        let mut first = 0;
+        let mut tables = Vec::new();
+        for table in self.query.contiguous_iter().into_iter().flatten() {
+            tables.push((first, table));
+            first += table.0.len();
+        }
+        ConeColumns(tables)
+    }
+
+    /// Calls `act` for the cones at some places, each with a value of its own.
+    pub fn apply_at<T>(&mut self, values: impl Iterator<Item = (usize, T)>, act: impl Fn(&mut SpringState, T)) {
+        let mut first = 0;
+        let mut tables = Vec::new();
+        for (identities, .., springs) in self.query.contiguous_iter_mut().into_iter().flatten() {
+            tables.push((first, springs));
+            first += identities.len();
+        }
+        for (index, value) in values {
+            let table = tables.partition_point(|(first, _)| *first <= index) - 1;
+            let (first, springs) = &mut tables[table];
+            act(&mut springs.bypass_change_detection()[index - *first], value);
+        }
     }
 
     /// Adds `pulls`, one a growing cone in the order of [`Self::collect`], times `weight`.
@@ -83,6 +114,29 @@ impl Cones<'_, '_> {
         for ((.., mut spring), value) in growing.zip(values) {
             act(&mut spring, value);
         }
+    }
+}
+
+/// Neighbouring cones, component by component.
+type Table<'a> = (&'a [GrowthCone], &'a [Status], &'a [Site], &'a [Position], &'a [ReceptorWeights], &'a [SpringState]);
+
+/// The i-th cone of a table whose first has the place `first`.
+fn of_table<'a>(first: usize, table: &Table<'a>, i: usize) -> (Cone<'a>, &'a SpringState) {
+    let (identities, _, sites, positions, receptors, springs) = table;
+    let (index, receptors) = (first + i, &*receptors[i].0);
+    (Cone { index, identity: &identities[i], site: sites[i], position: positions[i].0, receptors }, &springs[i])
+}
+
+/// All growth cones, to be looked at by place.
+pub struct ConeColumns<'a>(Vec<(usize, Table<'a>)>);
+
+impl<'a> ConeColumns<'a> {
+    /// The cone at a place that some view of a cone [named](Cone::index), and its spring state.
+    #[inline]
+    pub fn at(&self, index: usize) -> (Cone<'a>, &'a SpringState) {
+        let table = self.0.partition_point(|(first, _)| *first <= index) - 1;
+        let (first, table) = &self.0[table];
+        of_table(*first, table, index - first)
     }
 }
 

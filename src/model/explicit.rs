@@ -59,7 +59,7 @@ fn enter_stage(step: &Step, mover: &mut Mover, tableau: &ButcherTableau, stage: 
     match walk(&step.tissue.mesh, step.tissue.mesh.vertices(), from.planar(), flat(shift), &nowhere(BorderRule::Slide))
     {
         Ok(walked) => *mover.site = walked.point.into(),
-        Err(fault) => mover.start.fault = Some(fault),
+        Err(fault) => mover.start.fault = Some(fault.into()),
     }
     mover.position.0 = step.configuration.position(&step.tissue.mesh, *mover.site);
 }

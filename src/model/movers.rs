@@ -38,7 +38,7 @@ pub struct StepStart {
     pub(super) drift: f64,
     /// What methods of several stages keep besides; made when one of them needs it.
     stages: Option<Box<Stages>>,
-    pub(super) fault: Option<WalkError>,
+    pub(super) fault: Option<Box<WalkError>>,
 }
 
 /// What the stages of an explicit method found.
@@ -126,7 +126,7 @@ impl Step<'_> {
             &nowhere(BorderRule::Slide),
         ) {
             Ok(walked) => *mover.site = walked.point.into(),
-            Err(fault) => mover.start.fault = Some(fault),
+            Err(fault) => mover.start.fault = Some(fault.into()),
         }
         mover.position.0 = self.configuration.position(&self.tissue.mesh, *mover.site);
     }
@@ -172,7 +172,7 @@ impl Step<'_> {
             Ok(walked) => self.settle(mover, walked, length),
             Err(fault) => {
                 *mover.site = from;
-                mover.start.fault = Some(fault);
+                mover.start.fault = Some(fault.into());
             }
         }
     }

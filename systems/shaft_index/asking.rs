@@ -20,15 +20,16 @@ pub struct Asking {
 }
 
 impl Asking {
-    /// All growing cones, in their order.
-    pub fn all(cones: &Cones) -> Vec<Self> {
-        cones.collect(|cone, spring| Self {
+    /// A cone as it asks.
+    #[inline]
+    pub fn of((cone, spring): (Cone, &SpringState)) -> Self {
+        Self {
             index: cone.index as u32,
             population: cone.identity.population,
             site: cone.site,
             position: cone.position,
             heading: spring.heading,
-        })
+        }
     }
 
     /// What the cone makes of segments other than its own by a law, times its adhesion to their kinds.

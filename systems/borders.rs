@@ -8,6 +8,8 @@
 
 use crate::numerics::simplex_mesh::BorderFacet;
 use crate::prelude::*;
+use nalgebra::Vector2;
+use std::ops::Range;
 
 keys! {
     /// Short-range repulsion along the borders; L̂ += λ_b Σ_edges n_in exp(−d/ℓ_b).
@@ -45,7 +47,7 @@ impl Mechanism for Borders {
 /// Beyond this many ranges a border adds less than the rounding of a pull of 1, and is left out.
 const RANGES: f64 = 40.0;
 
-/// Bounding boxes of what the edges are in the present configuration, or in the part of a path that it belongs to.
+/// Where the edges are in the present configuration, or in the part of a path that it belongs to.
 #[derive(Debug, Default, Resource)]
 struct EdgeBoxes {
     holds: Option<Holds>,
@@ -61,12 +63,16 @@ enum Holds {
 
 type Bounds = [[f64; 2]; 2];
 
-/// Bounding box of a named edge, and of each run of so many of its facets.
+/// Bounding box of a named edge, and of each run of so many of its facets; the ends of these, where all vertices are at hand.
 #[derive(Debug)]
 struct EdgeBox {
     whole: Bounds,
     runs: Vec<Bounds>,
+    ends: Option<Vec<Ends>>,
 }
+
+/// Both ends of a facet (µm), with the tissue to their left.
+type Ends = [Vector2<f64>; 2];
 
 /// Facets of a run.
 const RUN: usize = 8;
@@ -85,7 +91,9 @@ fn bound_edges(tissue: Res<Tissue>, configuration: Res<Configuration>, mut boxes
     boxes.holds = Some(holds);
     let of_edge = |facets: &Vec<BorderFacet>| {
         let runs: Vec<_> = facets.chunks(RUN).map(|run| bounding_box(&tissue, &configuration, run)).collect();
-        EdgeBox { whole: runs.iter().copied().fold(NOWHERE, both), runs }
+        let ends = || facets.iter().map(|facet| facet_ends(&tissue, &configuration, *facet)).collect();
+        let at_hand = configuration.part().is_none();
+        EdgeBox { whole: runs.iter().copied().fold(NOWHERE, both), runs, ends: at_hand.then(ends) }
     };
     boxes.edges = tissue.edges.iter().map(of_edge).collect();
 }
@@ -112,73 +120,78 @@ fn repel(
 ) {
     let (weight, range) = (law.weight.0, law.range.0);
     cones.for_each(|cone, spring| {
-        for (facets, bounds) in tissue.edges.iter().zip(&boxes.edges) {
-            if squared_distance_to_box(cone.position, &bounds.whole) < (RANGES * range).powi(2) {
-                let edge = (facets.as_slice(), bounds.runs.as_slice());
-                spring.pull += edge_pull(&tissue, &configuration, edge, cone.position, range) * weight;
+        let x = cone.position.xy();
+        for (facets, edge) in tissue.edges.iter().zip(&boxes.edges) {
+            if squared_distance_to_box(x, &edge.whole) < (RANGES * range).powi(2) {
+                let pull = match &edge.ends {
+                    Some(ends) => edge_pull(&edge.runs, (facets.len(), |i| ends[i]), x, range),
+                    None => {
+                        let ends = |i: usize| facet_ends(&tissue, &configuration, facets[i]);
+                        edge_pull(&edge.runs, (facets.len(), ends), x, range)
+                    }
+                };
+                spring.pull += Vector3::new(pull.x, pull.y, 0.0) * weight;
             }
         }
     });
 }
 
-fn squared_distance_to_box(x: Vector3<f64>, bounds: &Bounds) -> f64 {
+fn squared_distance_to_box(x: Vector2<f64>, bounds: &Bounds) -> f64 {
     let outside = |k: usize| (bounds[0][k] - x[k]).max(x[k] - bounds[1][k]).max(0.0);
     outside(0).powi(2) + outside(1).powi(2)
 }
 
-/// Of the first facet that is nearest to x: squared distance (µm²), from its nearest point to x, and along it.
-fn nearest_of(
-    facets: &[BorderFacet],
-    tissue: &Tissue,
-    configuration: &Configuration,
-    x: Vector3<f64>,
-) -> (f64, Vector3<f64>, Vector3<f64>) {
-    let mut best = (f64::INFINITY, Vector3::zeros(), Vector3::zeros());
-    for facet in facets {
-        let [a, b] = facet_ends(tissue, configuration, *facet);
-        let share = ((x - a).dot(&(b - a)) / (b - a).norm_squared()).clamp(0.0, 1.0);
-        let from_facet = x - (a + (b - a) * share);
-        let squared = from_facet.norm_squared();
-        best = if squared < best.0 { (squared, from_facet, b - a) } else { best };
+/// From the nearest point of a facet to x.
+#[inline]
+fn from_facet([a, b]: Ends, x: Vector2<f64>) -> Vector2<f64> {
+    let share = ((x - a).dot(&(b - a)) / (b - a).norm_squared()).clamp(0.0, 1.0);
+    x - (a + (b - a) * share)
+}
+
+/// Of the first facet that is nearest to x: squared distance (µm²) and number.
+#[inline]
+fn nearest_of(facets: Range<usize>, ends: &impl Fn(usize) -> Ends, x: Vector2<f64>) -> (f64, usize) {
+    let mut best = (f64::INFINITY, facets.start);
+    for i in facets {
+        let squared = from_facet(ends(i), x).norm_squared();
+        best = if squared < best.0 { (squared, i) } else { best };
     }
     best
 }
 
-/// n_in exp(−d/ℓ) of one edge at x: n_in from the edge's nearest point to x (the facet's inner normal on the edge itself).
+/// n_in exp(−d/ℓ) of an edge of so many facets at x: n_in from the edge's nearest point to x (the facet's inner normal on the edge itself).
 fn edge_pull(
-    tissue: &Tissue,
-    configuration: &Configuration,
-    (facets, runs): (&[BorderFacet], &[Bounds]),
-    x: Vector3<f64>,
+    runs: &[Bounds],
+    (count, ends): (usize, impl Fn(usize) -> Ends),
+    x: Vector2<f64>,
     range: f64,
-) -> Vector3<f64> {
+) -> Vector2<f64> {
+    let facets = |run: usize| run * RUN..count.min((run + 1) * RUN);
     let bounded = runs.iter().map(|bounds| squared_distance_to_box(x, bounds));
     let closest = bounded.clone().zip(0..).min_by(|a, b| a.0.total_cmp(&b.0)).map_or(0, |(_, run)| run);
-    let found = nearest_of(&facets[closest * RUN..facets.len().min((closest + 1) * RUN)], tissue, configuration, x);
-    let mut best = (f64::INFINITY, Vector3::zeros(), Vector3::zeros());
-    for (run, (facets, squared)) in facets.chunks(RUN).zip(bounded).enumerate() {
+    let found = nearest_of(facets(closest), &ends, x);
+    let mut best = (f64::INFINITY, 0);
+    for (run, squared) in bounded.enumerate() {
         // A hair less than the distance to the box, for rounding: what is skipped is not the nearest.
         if squared * (1.0 - 1e-9) <= found.0 {
-            let other = if run == closest { found } else { nearest_of(facets, tissue, configuration, x) };
+            let other = if run == closest { found } else { nearest_of(facets(run), &ends, x) };
             best = if other.0 < best.0 { other } else { best };
         }
     }
-    let (nearest, away, along) = best;
+    let (nearest, facet) = best;
     if nearest >= (RANGES * range).powi(2) {
-        return Vector3::zeros();
+        return Vector2::zeros();
     }
-    let distance = nearest.sqrt();
-    let inward = if distance > 0.0 { away / distance } else { Vector3::new(-along.y, along.x, 0.0).normalize() };
+    let (distance, [a, b]) = (nearest.sqrt(), ends(facet));
+    let along = b - a;
+    let inward =
+        if distance > 0.0 { from_facet([a, b], x) / distance } else { Vector2::new(-along.y, along.x).normalize() };
     inward * (-distance / range).exp()
 }
 
-fn facet_ends(tissue: &Tissue, configuration: &Configuration, facet: BorderFacet) -> [Vector3<f64>; 2] {
+fn facet_ends(tissue: &Tissue, configuration: &Configuration, facet: BorderFacet) -> Ends {
     let corners = tissue.mesh.cell(facet.cell as usize);
-    let end = |k: usize| {
-        let x = configuration.vertex(corners[(facet.face as usize + k) % 3] as usize);
-        Vector3::new(x[0], x[1], 0.0)
-    };
-    [end(1), end(2)]
+    [1, 2].map(|k| configuration.vertex(corners[(facet.face as usize + k) % 3] as usize).into())
 }
 
 #[cfg(test)]

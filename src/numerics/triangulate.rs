@@ -53,9 +53,17 @@ pub struct FittedMesh {
 /// Why a domain could not be meshed.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum TriangulationError {
-    /// The domain or an outline is not a proper polygon.
+    /// The domain is not made of proper polygons.
     #[error(transparent)]
     Domain(#[from] DomainError),
+    /// An outline is not a proper polygon.
+    #[error("outline {outline} is no proper polygon: {error}")]
+    Outline {
+        /// Index of the outline.
+        outline: usize,
+        /// What is wrong with it.
+        error: DomainError,
+    },
     /// An option makes no sense.
     #[error("the mesh option {option} is {value}, which is not {wanted}")]
     Option {
@@ -130,7 +138,7 @@ pub fn triangulate_graded(
     check_options(options)?;
     domain.check()?;
     for (index, outline) in outlines.iter().enumerate() {
-        outline.check(&format!("outline {index}"))?;
+        outline.check("the shape").map_err(|error| TriangulationError::Outline { outline: index, error })?;
         check_inside(domain, index, outline)?;
     }
     let segments: Vec<_> = domain

@@ -237,10 +237,15 @@ impl Meshing<'_> {
             max_vertices: keys.max_vertices as usize,
         };
         let shapes = self.named.iter().map(|(_, name, shape)| (name.as_str(), shape));
+        let at_shape = |shape: usize, account| AssemblyError::at(&self.named[shape].0, account);
         Tissue::meshed(domain, shapes, (options, grading), self.inputs).map_err(|error| match error {
-            TriangulationError::OutlineOutside { outline, point } => AssemblyError::at(
-                &self.named[outline].0,
-                format!("lies outside the tissue at ({:.4}, {:.4}) um", point[0], point[1]),
+            TriangulationError::OutlineOutside { outline, point } => {
+                at_shape(outline, format!("lies outside the tissue at ({:.4}, {:.4}) um", point[0], point[1]))
+            }
+            TriangulationError::Outline { outline, error } => at_shape(outline, error.to_string()),
+            TriangulationError::NotFitted { outline, area, wanted } => at_shape(
+                outline,
+                format!("is too small or too thin for this tissue: cells cover {area:e} um^2 of its {wanted:e} um^2"),
             ),
             TriangulationError::TooManyVertices { .. } if grading.finest() > 0 && keys.refinement.is_some() => {
                 AssemblyError::at("/tissue/refinement/tolerance", format!("{error}; a larger tolerance asks for fewer"))

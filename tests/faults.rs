@@ -302,6 +302,8 @@ fn a_full_disk_is_told_and_what_had_been_written_stays_readable() {
     assert!(words.contains("cannot write ") && words.contains("No space left on device"), "{words}");
     assert_eq!(words.matches("warning: no checkpoint at t = ").count(), 1, "one warning a reason: {words}");
     demand_whole_files(&tiny.0);
+    let summary = std::fs::read_to_string(tiny.0.join("summary.json")).unwrap_or_default();
+    assert!(!summary.contains("\"complete\": true"), "results that are not whole: {summary}");
 }
 
 #[test]

@@ -167,6 +167,34 @@ fn a_new_run_clears_all_files_of_an_earlier_one_and_nothing_else() {
 }
 
 #[test]
+fn a_run_replaces_nothing_that_no_run_has_written() {
+    let folder = with_scene(&scene());
+    let out = folder.0.join("out/scene");
+    std::fs::create_dir_all(out.join("swc")).unwrap();
+    // A manifest of something else does not make a folder that of a run.
+    let mine = [("manifest.json", "{\"name\": \"a web page\"}"), ("axons.csv", "mine"), ("swc/axon_000.swc", "mine")];
+    mine.iter().for_each(|(name, text)| std::fs::write(out.join(name), text).unwrap());
+    run(&folder, &[]);
+    mine[1..].iter().for_each(|(name, text)| assert_eq!(std::fs::read_to_string(out.join(name)).unwrap(), *text));
+    // What is called as a checkpoint and is none.
+    let other = folder.0.join("other");
+    std::fs::create_dir_all(&other).unwrap();
+    std::fs::write(other.join("checkpoint.bin"), "mine").unwrap();
+    let refused = tropism(&folder, &["scene.json", "--out", "other", "--checkpoint", "0s"]);
+    let words = "cannot write other/checkpoint.bin: no checkpoint of this program, and not replaced";
+    assert!(refused.status.code() == Some(1) && errors(&refused).contains(words), "{}", errors(&refused));
+    assert_eq!(names(&other), ["checkpoint.bin"]);
+    // A scenario that is called as one of its results.
+    folder.write("summary.json", &scene().to_string());
+    for more in [&[][..], &["--seeds", "2"]] {
+        let refused = tropism(&folder, &[&["summary.json", "--out", "."], more].concat());
+        let words = "it is the scenario of this run; another name or another --out is needed";
+        assert!(refused.status.code() == Some(1) && errors(&refused).contains(words), "{}", errors(&refused));
+    }
+    assert_eq!(std::fs::read_to_string(folder.0.join("summary.json")).unwrap(), scene().to_string());
+}
+
+#[test]
 #[cfg(unix)]
 fn trees_of_an_earlier_run_go_and_a_link_is_not_followed() {
     let folder = with_scene(&scene());

@@ -19,6 +19,13 @@ const FORMAT: u32 = 5;
 const HEADER: usize = 24;
 const PROGRAM: &str = env!("CARGO_PKG_VERSION");
 
+/// Whether a file begins as a checkpoint does.
+pub fn is_checkpoint(path: &Path) -> bool {
+    let mut first = [0; MAGIC.len()];
+    let is_file = path.symlink_metadata().is_ok_and(|found| found.is_file());
+    is_file && File::open(path).is_ok_and(|mut file| file.read_exact(&mut first).is_ok()) && first == *MAGIC
+}
+
 /// Everything that a run needs to go on.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Checkpoint {

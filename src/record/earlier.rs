@@ -2,7 +2,10 @@
 //!
 //! Only names that a run writes are looked at, only in a folder with the manifest of a run, and no link is followed or removed.
 
+use super::checkpoint::{NAMES, is_checkpoint};
 use super::output::WriteError;
+use crate::scenario::read::read_file;
+use serde_json::Value;
 use std::fs;
 use std::io;
 use std::path::Path;
@@ -31,10 +34,12 @@ const FILES: [&str; 17] = [
 /// Removes the results of an earlier run, and the folders of its own that are empty then.
 ///
 /// # Errors
-/// The path and the system's reason.
-pub fn clear(folder: &Path) -> Result<(), WriteError> {
-    if !is(&folder.join("manifest.json"), fs::Metadata::is_file) {
-        return Ok(());
+/// The path and the system's reason; what a new run would replace although no run has written it: its own scenario, or, in a folder
+/// that is not that of a run, what is called as a checkpoint and is none.
+pub fn clear(folder: &Path, scenario: &Path) -> Result<(), WriteError> {
+    demand_apart(folder, scenario)?;
+    if !is_of_a_run(&folder.join("manifest.json")) {
+        return demand_no_foreign_checkpoint(folder);
     }
     let [vtu, swc] = ["vtu", "swc"].map(|name| folder.join(name));
     for name in FILES.iter().filter(|name| !name.starts_with("vtu/") || is(&vtu, fs::Metadata::is_dir)) {
@@ -52,6 +57,36 @@ pub fn clear(folder: &Path) -> Result<(), WriteError> {
         clear_of(&swc, &|name| is_axon(name) || name.strip_suffix(".zip").is_some_and(is_number))?;
     }
     Ok(())
+}
+
+/// A scenario in the folder of its results must not be called as one of them.
+fn demand_apart(folder: &Path, scenario: &Path) -> Result<(), WriteError> {
+    let (Ok(scenario), Ok(folder)) = (scenario.canonicalize(), folder.canonicalize()) else { return Ok(()) };
+    let mut written = FILES.iter().chain(&NAMES).chain(&["manifest.json"]);
+    match written.any(|name| folder.join(name) == scenario) {
+        true => Err(foreign(&scenario, "it is the scenario of this run; another name or another --out is needed")),
+        false => Ok(()),
+    }
+}
+
+fn demand_no_foreign_checkpoint(folder: &Path) -> Result<(), WriteError> {
+    let there = NAMES.iter().map(|name| folder.join(name)).filter(|path| path.symlink_metadata().is_ok());
+    match there.into_iter().find(|path| !is_checkpoint(path)) {
+        Some(path) => Err(foreign(&path, "no checkpoint of this program, and not replaced; another --out is needed")),
+        None => Ok(()),
+    }
+}
+
+fn foreign(path: &Path, words: &str) -> WriteError {
+    WriteError { path: path.to_owned(), source: io::Error::other(words) }
+}
+
+/// Whether a file is the manifest of a run.
+fn is_of_a_run(manifest: &Path) -> bool {
+    let read = || read_file(manifest).ok().filter(|_| is(manifest, fs::Metadata::is_file));
+    let has =
+        |value: &Value| value["version"].is_string() && value["scene"].is_string() && value["scenario"].is_object();
+    read().is_some_and(|value| has(&value))
 }
 
 /// Removes the files with certain names from a folder, and the folder if it is empty then; what somebody else has put there stays.

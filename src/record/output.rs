@@ -183,7 +183,8 @@ pub fn prepare_folder(folder: &Path) -> Result<(), WriteError> {
         let source = io::Error::new(io::ErrorKind::NotADirectory, "it is a file, not a folder");
         return Err(WriteError { path: folder.to_owned(), source });
     }
-    let trial = folder.join(".trial");
+    // A name of its own: another run may try the same folder.
+    let trial = folder.join(format!(".trial-{}", std::process::id()));
     write_atomically(&trial, b"")?;
     fs::remove_file(&trial).map_err(|source| WriteError { path: trial, source })
 }

@@ -76,11 +76,10 @@ pub enum ReadError {
 /// # Errors
 /// A [`ReadError`]; those that do not name the file are about its content.
 pub fn read_file(path: &Path) -> Result<Value, ReadError> {
-    let text = read_text(path)?;
-    parse(text.strip_prefix('\u{feff}').unwrap_or(&text))
+    parse(&read_text(path)?)
 }
 
-/// Reads a text of at most [`LARGEST_FILE`].
+/// Reads a text of at most [`LARGEST_FILE`], without a byte order mark.
 ///
 /// # Errors
 /// A [`ReadError`] that names the file.
@@ -108,7 +107,8 @@ pub fn read_text(path: &Path) -> Result<String, ReadError> {
         return Err(ReadError::TooLarge { path: owned() });
     }
     let not_text = |error: FromUtf8Error| ReadError::NotText { path: owned(), at: error.utf8_error().valid_up_to() };
-    String::from_utf8(bytes).map_err(not_text)
+    let text = String::from_utf8(bytes).map_err(not_text)?;
+    Ok(text.strip_prefix('\u{feff}').map(str::to_owned).unwrap_or(text))
 }
 
 /// Reads a JSON text.

@@ -335,10 +335,9 @@ pub(super) fn recorder_options(loaded: &Loaded, keep: Records) -> RecorderOption
 /// The file that could not be written, or the picture that could not be drawn.
 pub fn write_results(folder: &Path, asked: Asked, finished: &Finished) -> Result<(), RunError> {
     let loaded = asked.loaded;
-    write_json(&folder.join("summary.json"), &finished.summary)?;
-    write_json(&folder.join("manifest.json"), &Manifest::of(loaded))?;
-    asked.report_run(folder, finished)?;
     let Recorder { trajectories, snapshots, .. } = &finished.recorder;
+    let manifest = write_json(&folder.join("manifest.json"), &Manifest::of(loaded));
+    let report = asked.report_run(folder, finished);
     let (table, figure) = rayon::join(
         || match loaded.scene.output.tables.are_csv() {
             true => trajectories.write(&folder.join("trajectories.csv")),
@@ -346,8 +345,14 @@ pub fn write_results(folder: &Path, asked: Asked, finished: &Finished) -> Result
         },
         || write_figure(folder, loaded, snapshots),
     );
-    table?;
-    figure
+    let written = manifest.and(report).and(table.map_err(RunError::from)).and(figure);
+    // Last, since it says whether the results are whole.
+    let mut summary = finished.summary.clone();
+    if let Err(error) = &written {
+        summary.complete = false;
+        summary.notes.push(format!("results are not whole: {error}"));
+    }
+    written.and(write_json(&folder.join("summary.json"), &summary))
 }
 
 /// Writes `figure.svg` and `figure.png`; nothing if no time was asked for.

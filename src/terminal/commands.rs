@@ -208,8 +208,8 @@ pub fn run_stability(folder: &Path, roster: &Roster) -> Result<ExitCode, RunErro
 pub fn run_seeds(cli: &Cli, roster: &Roster, loaded: &Loaded, folder: &Path, count: u64) -> Result<ExitCode, RunError> {
     admit_many(&cli.scene, loaded, roster, count)?;
     let interrupt = Interrupt::catch().map_err(|error| RunError::Internal(error.to_string()))?;
+    earlier::clear(folder, &cli.scene.path())?;
     checkpoint::remove(folder)?;
-    earlier::clear(folder)?;
     let bar = progress_bar(count as f64, "seeds");
     let tick = |share| bar.set_position((share * 1000.0) as u64);
     let stop = || interrupt.caught().map(|signal| signal.name.to_owned());

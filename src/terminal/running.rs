@@ -40,7 +40,7 @@ pub fn run_once(
 ) -> Result<ExitCode, RunError> {
     let mut run = Run::begin(asked.loaded, roster, path, Records::ALL)?;
     room.admit(&asked.loaded.scene.name, &memory_of(&run.simulation, asked.loaded, Records::ALL)?, 1)?;
-    earlier::clear(folder)?;
+    earlier::clear(folder, path)?;
     run.writes_into(folder, asked.loaded)?;
     let mut checkpoints = Checkpoints::new(folder, interval, (asked, path));
     checkpoints.begin(&mut run)?;

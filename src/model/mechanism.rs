@@ -83,7 +83,7 @@ pub enum InstallError {
 pub struct Facts {
     /// Names of the populations.
     pub populations: Vec<String>,
-    /// Names of the tissue's edges; none if the tissue itself is wrong, and what it is not known.
+    /// Names of the tissue's edges; none if the tissue itself is wrong: they are not known then.
     pub edges: Vec<String>,
     /// The blocks of all mechanisms in the scene, as JSON.
     pub blocks: serde_json::Map<String, Value>,

@@ -4,7 +4,7 @@
 //! what [`Checkpoint`] lists, in its order. A new one is written whole and flushed to disk before the last one makes room, so at
 //! any instant one of the two files is whole.
 
-use super::output::{WriteError, write_and_keep_previous};
+use super::output::{WriteError, remove_if_there, write_and_keep_previous};
 use crate::model::keep::{Damage, Keep, KeptBytes};
 use crate::scenario::read::NO_FILE;
 use std::fs::{self, File};
@@ -191,13 +191,7 @@ pub fn paths(folder: &Path) -> [PathBuf; 2] {
 /// # Errors
 /// The path and the system's reason.
 pub fn remove(folder: &Path) -> Result<(), WriteError> {
-    for path in paths(folder) {
-        match fs::remove_file(&path) {
-            Err(source) if source.kind() != io::ErrorKind::NotFound => return Err(WriteError { path, source }),
-            _ => {}
-        }
-    }
-    Ok(())
+    paths(folder).iter().try_for_each(|path| remove_if_there(path))
 }
 
 #[cfg(test)]

@@ -3,7 +3,7 @@
 //! Only names that a run writes are looked at, only in a folder with the manifest of a run, and no link is followed or removed.
 
 use super::checkpoint::{NAMES, is_checkpoint};
-use super::output::WriteError;
+use super::output::{WriteError, remove_if_there};
 use crate::scenario::read::read_file;
 use serde_json::Value;
 use std::fs;
@@ -83,10 +83,9 @@ fn foreign(path: &Path, words: &str) -> WriteError {
 
 /// Whether a file is the manifest of a run.
 fn is_of_a_run(manifest: &Path) -> bool {
-    let read = || read_file(manifest).ok().filter(|_| is(manifest, fs::Metadata::is_file));
     let has =
-        |value: &Value| value["version"].is_string() && value["scene"].is_string() && value["scenario"].is_object();
-    read().is_some_and(|value| has(&value))
+        |value: Value| value["version"].is_string() && value["scene"].is_string() && value["scenario"].is_object();
+    is(manifest, fs::Metadata::is_file) && read_file(manifest).is_ok_and(has)
 }
 
 /// Removes the files with certain names from a folder, and the folder if it is empty then; what somebody else has put there stays.
@@ -118,11 +117,5 @@ fn is(path: &Path, kind: impl Fn(&fs::Metadata) -> bool) -> bool {
 }
 
 fn remove(path: &Path) -> Result<(), WriteError> {
-    if !is(path, fs::Metadata::is_file) {
-        return Ok(());
-    }
-    match fs::remove_file(path) {
-        Err(source) if source.kind() != io::ErrorKind::NotFound => Err(WriteError { path: path.to_owned(), source }),
-        _ => Ok(()),
-    }
+    if is(path, fs::Metadata::is_file) { remove_if_there(path) } else { Ok(()) }
 }

@@ -56,10 +56,7 @@ pub fn write_unsynced(path: &Path, contents: &[u8]) -> Result<(), WriteError> {
 
 /// A fresh file under a temporary name. What a run that was killed, or a link that somebody laid, left there goes: it is not written through.
 fn begun_anew(temporary: &Path) -> io::Result<File> {
-    match fs::remove_file(temporary) {
-        Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(error),
-        _ => {}
-    }
+    remove_if_there(temporary).map_err(|error| error.source)?;
     File::create_new(temporary)
 }
 
@@ -156,22 +153,15 @@ pub fn no_link(folder: &Path) -> Result<(), WriteError> {
     }
 }
 
-/// Removes the files of one ending that an earlier run left in numbered folders within a folder, and such folders as are empty then.
+/// Removes a file, or a link, if it is there.
 ///
 /// # Errors
 /// The path and the system's reason.
-pub fn clear_numbered(folder: &Path, ending: &str) -> Result<(), WriteError> {
-    let numbered = |entry: &fs::DirEntry| {
-        let is_number = entry.file_name().to_str().is_some_and(|name| name.len() >= 4 && name.parse::<u32>().is_ok());
-        is_number && entry.file_type().is_ok_and(|kind| kind.is_dir())
-    };
-    let Ok(entries) = fs::read_dir(folder) else { return Ok(()) };
-    for entry in entries.flatten().filter(numbered) {
-        clear_folder(&entry.path(), ending)?;
-        // It stays if somebody else has put something there.
-        let _ = fs::remove_dir(entry.path());
+pub fn remove_if_there(path: &Path) -> Result<(), WriteError> {
+    match fs::remove_file(path) {
+        Err(source) if source.kind() != io::ErrorKind::NotFound => Err(WriteError { path: path.to_owned(), source }),
+        _ => Ok(()),
     }
-    Ok(())
 }
 
 /// Makes a folder for results and tries to write into it, so that a long run does not end in one that cannot be written.

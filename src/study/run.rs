@@ -25,6 +25,7 @@ use crate::scenario::schema::{BlockFindings, BlockSchema};
 use crate::simulation::{AssemblyError, Simulation};
 use serde::Serialize;
 use serde_json::Value;
+use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
 /// Resolution of pictures, dots an inch.
@@ -347,12 +348,13 @@ pub fn write_results(folder: &Path, asked: Asked, finished: &Finished) -> Result
     );
     let written = manifest.and(report).and(table.map_err(RunError::from)).and(figure);
     // Last, since it says whether the results are whole.
-    let mut summary = finished.summary.clone();
+    let mut summary = Cow::Borrowed(&finished.summary);
     if let Err(error) = &written {
+        let summary = summary.to_mut();
         summary.complete = false;
         summary.notes.push(format!("results are not whole: {error}"));
     }
-    written.and(write_json(&folder.join("summary.json"), &summary))
+    written.and(write_json(&folder.join("summary.json"), &*summary))
 }
 
 /// Writes `figure.svg` and `figure.png`; nothing if no time was asked for.

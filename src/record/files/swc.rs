@@ -5,7 +5,7 @@
 //! a single point has no file, since readers refuse it; it is listed in the notes.
 
 use super::super::csv::format_number;
-use super::super::output::{Partial, WriteError, clear_folder, clear_numbered, no_link, write_unsynced};
+use super::super::output::{Partial, WriteError, clear_folder, no_link, write_unsynced};
 use super::swc_tree::{Tree, trees};
 use super::{Output, OutputError};
 use crate::model::clock::Clock;
@@ -55,12 +55,7 @@ impl Output for SwcFiles {
         let files = whole.iter().map(|tree| (format!("axon_{:0width$}.swc", tree.axon), text(tree, hours, &self.keys)));
         match self.keys.archive {
             true => write_archive(&self.place().with_extension("zip"), files)?,
-            false => {
-                if self.looks == 0 {
-                    clear_numbered(&self.folder.join("swc"), "swc")?;
-                }
-                write_folder(&self.place(), files)?;
-            }
+            false => write_folder(&self.place(), files)?,
         }
         self.looks += 1;
         self.written = whole.len();

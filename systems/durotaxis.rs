@@ -56,6 +56,7 @@ impl Mechanism for Durotaxis {
 
     fn install(self, model: &mut ModelBuilder) -> Result<(), InstallError> {
         model.pulls_up_to(self.weight.0);
+        model.plan().leads = true;
         model.insert_law(self).term(Term::Turn, feel);
         Ok(())
     }

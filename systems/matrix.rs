@@ -288,7 +288,10 @@ impl Mechanism for Matrix {
         plan.work("matrix", Work::NewtonUnknown, iterations, Each::Run);
         let curve = self.load.clone();
         let upright = inverse_stretches.is_some();
-        model.insert(Loading { equilibria, inputs, curve, duration }).insert_law(self);
+        let loading = Loading { equilibria, inputs, curve, duration };
+        let swelling = loading.swelling(&model.world.resource::<Tissue>().mesh);
+        model.plan().swelling = swelling;
+        model.insert(loading).insert_law(self);
         if upright {
             model.upright_motion(follow_load);
         } else {
@@ -374,6 +377,9 @@ struct Equilibria {
     inverse_stretches: Option<Vec<f64>>,
 }
 
+/// Instants of the run at which the tissue's area is looked at for the plan.
+const INSTANTS: u32 = 4;
+
 /// The solved load path, and the load over time.
 #[derive(Debug, Resource)]
 pub struct Loading {
@@ -422,6 +428,16 @@ impl Loading {
     /// Coordinates (µm) and velocities (µm/h) at a time (h); at a corner of the load curve those of the piece before.
     pub fn motion(&self, mesh: &Arc<SimplexMesh<2>>, time: f64) -> (Vec<[f64; 2]>, Vec<[f64; 2]>) {
         along_path(mesh, self.path().path(), self.at(time))
+    }
+
+    /// Area over area at rest, minus 1, in the mean over the run.
+    fn swelling(&self, mesh: &Arc<SimplexMesh<2>>) -> f64 {
+        let area = |coordinates: &[[f64; 2]]| -> f64 {
+            (0..mesh.cell_count()).map(|cell| mesh.volume(coordinates, cell)).sum()
+        };
+        let instants = (0..INSTANTS).map(|i| (f64::from(i) + 0.5) / f64::from(INSTANTS) * self.duration);
+        let areas: f64 = instants.map(|time| area(&self.configuration(mesh, self.at(time).0).0)).sum();
+        areas / f64::from(INSTANTS) / area(mesh.vertices()) - 1.0
     }
 
     /// Coordinates (µm) and their derivative with respect to the load, at a load.

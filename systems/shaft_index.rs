@@ -328,8 +328,12 @@ fn tell(model: &mut ModelBuilder, reach: f64, search: Search) {
     plan.work(PART, Work::EvenSegment, even, Each::ConeStage);
 }
 
+/// Even neighbours from which on axons that grow abreast are drawn into bundles, and how many times denser these become at most. Ours, measured.
+const BUNDLING: (f64, f64) = (4.2, 3.0);
+
 /// Segments within a square of half side `reach` (µm) about a cone, if half of the way of all axons lay before it and were evenly spread
-/// over the longer side of the box of all births, widened by the reach, times its shorter side and the way of one axon.
+/// over the longer side of the box of all births, widened by the reach, times its shorter side and the way of one axon; and more where many
+/// grow abreast, which gather in bundles.
 fn evenly_spread(world: &mut World, reach: f64) -> f64 {
     let mut origins = world.query::<&Origin>();
     let tissue = world.resource::<Tissue>();
@@ -344,7 +348,8 @@ fn evenly_spread(world: &mut World, reach: f64) -> f64 {
     let (extent, way) = (high - low, fastest * clock.grid.hours(clock.end));
     let (width, depth) = (extent.max().max(0.0) + 2.0 * reach, extent.x.min(extent.y).max(0.0));
     let abreast = if way > 0.0 { way / (depth + way) } else { 1.0 };
-    0.5 * shafts.count() as f64 / width * (2.0 * reach).powi(2) / shafts.mean_segment() * abreast
+    let even = 0.5 * shafts.count() as f64 / width * (2.0 * reach).powi(2) / shafts.mean_segment() * abreast;
+    even * (1.0 + abreast * ((even / BUNDLING.0).clamp(1.0, BUNDLING.1) - 1.0))
 }
 
 /// All vertices within a margin of a square, ascending.

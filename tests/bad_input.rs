@@ -131,6 +131,26 @@ fn a_mesh_that_no_memory_holds_is_refused_before_it_is_begun_with_its_number_of_
 }
 
 #[test]
+fn shapes_that_nearly_touch_are_refused_at_one_of_them_and_not_meshed_vertex_after_vertex() {
+    let beside = |gap: f64| {
+        let points = format!("[[100, 40], [{0}, 40], [{0}, 70], [100, 70]]", 120.0 - gap);
+        format!(
+            "/targets={{\"bulb\": {{\"polygon\": {{\"points\": {points}}}}}, \"next\": {{\"polygon\": {{\"points\": [[120, 40], [140, 40], [140, 70], [120, 70]]}}}}}}"
+        )
+    };
+    let room = "/tissue/max_vertices=1000000";
+    assert_eq!(refusal(&[&beside(0.1), room]), None);
+    for gap in [1e-4, 1e-6] {
+        let said = only(&[&beside(gap), room]);
+        assert!(
+            said.starts_with(&format!("/targets/bulb: sides come within {gap:.1e} µm of one another at (1")),
+            "{said}"
+        );
+        assert!(said.ends_with("Let them touch, move them apart, or ask for a smaller size"), "{said}");
+    }
+}
+
+#[test]
 fn a_shape_that_no_mesh_can_be_fitted_to_is_refused_at_its_own_place() {
     let cut = "{\"polygon\": {\"points\": [[80, 40], [80.000000001, 40], [120, 70], [80, 70]]}}";
     for (set, said) in [

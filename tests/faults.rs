@@ -8,6 +8,7 @@ use serde_json::{Value, json};
 use std::path::Path;
 use std::process::{Command, ExitCode, Stdio};
 use tropism::prelude::*;
+use tropism::record::output::prepare_folder;
 use tropism::simulation::Simulation;
 use tropism::systems;
 use tropism::systems::zippering::MostMoves;
@@ -359,12 +360,40 @@ fn with_output(arguments: &[&str], out: Stdio) -> (i32, String) {
 
 #[test]
 fn a_reader_that_has_gone_is_no_fault_and_a_full_device_is() {
-    for arguments in [&["scene.json"][..], &["schema"], &["mechanisms"], &["man"], &["completions", "bash"]] {
+    for arguments in [
+        &["scene.json"][..],
+        &["schema"],
+        &["mechanisms"],
+        &["man"],
+        &["completions", "bash"],
+        &["--help"],
+        &["--version"],
+    ] {
         let (code, words) = with_output(arguments, Stdio::piped());
         assert!(code == 0 && !words.contains("panicked"), "{arguments:?}: {words}");
         let Ok(full) = std::fs::OpenOptions::new().write(true).open("/dev/full") else { continue };
         let (code, words) = with_output(arguments, full.into());
         assert!(code == 1 && words.contains("error: standard output: No space left on device"), "{words}");
+    }
+}
+
+#[test]
+fn two_runs_do_not_write_into_one_folder_at_a_time() {
+    let folder = with_scene(&scene());
+    let results = folder.0.join("out/scene");
+    let claim = prepare_folder(&results).unwrap();
+    let run = |arguments: &[&str]| {
+        let output =
+            Command::new(env!("CARGO_BIN_EXE_tropism")).args(arguments).current_dir(&folder.0).output().unwrap();
+        (output.status.code().unwrap(), String::from_utf8_lossy(&output.stderr).into_owned())
+    };
+    let (code, words) = run(&["scene.json"]);
+    assert!(code == 1 && words.contains("another run writes into it; another --out is needed, or patience"), "{words}");
+    assert_eq!(std::fs::read_dir(&results).unwrap().count(), 0, "nothing is left");
+    drop(claim);
+    for arguments in [&["scene.json"][..], &["resume", "out/scene"]] {
+        let (code, words) = run(arguments);
+        assert_eq!(code, 0, "{words}");
     }
 }
 

@@ -203,6 +203,20 @@ fn decay_lengths_and_the_margins_of_the_mesh_are_told_of_each_cue() {
 }
 
 #[test]
+fn a_tissue_that_grows_draws_axons_apart() {
+    let crowding = |factor: f64| {
+        let grown = changed(|scene| {
+            scene["matrix"] =
+                json!({ "growth": { "factor": factor }, "motion": { "bottom": { "sideways": "sliding" } } })
+        });
+        planned(&grown).expected.crowding
+    };
+    // Free to grow: edges go as 1 + 0.2 s, and the area's mean over four instants s is 1 + 0.4/2 + 0.04 · 21/64.
+    let ratio = crowding(1.0 + 1e-9) / crowding(1.2);
+    assert!((ratio / (1.2 + 0.04 * 21.0 / 64.0) - 1.0).abs() < 1e-6, "{ratio}");
+}
+
+#[test]
 fn the_plan_as_json_has_its_estimates_and_a_summary_has_not() {
     let found = serde_json::to_value(planned(&scene())).unwrap();
     for estimate in ["memory_mb", "cpu_seconds"] {

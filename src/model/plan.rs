@@ -155,6 +155,12 @@ pub struct Plan {
     /// Work that is done; the estimate of a plan adds it up.
     #[serde(skip)]
     pub tasks: Vec<Task>,
+    /// By how much larger the tissue is than at rest, in the mean over the run: area over area, minus 1.
+    #[serde(skip)]
+    pub swelling: f64,
+    /// Whether something besides cues leads cones to where targets may lie.
+    #[serde(skip)]
+    pub leads: bool,
     /// The strongest pull |L̂| that the scene's mechanisms can add up to.
     pub strongest_pull: f64,
 }

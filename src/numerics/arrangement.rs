@@ -5,8 +5,8 @@
 
 use crate::numerics::polygon::{bounding_box, cross, distance, minus, nearest_on_side};
 use crate::numerics::side_tree::SideTree;
-use rstar::primitives::GeomWithData;
-use rstar::{AABB, RTree};
+use rstar::primitives::{GeomWithData, Line};
+use rstar::{AABB, PointDistance, RTree};
 
 type Segment = [[f64; 2]; 2];
 
@@ -63,6 +63,21 @@ impl Arrangement {
             segments.push([last, to]);
         }
         Self { points, segments }
+    }
+
+    /// The point that lies nearest to a segment it is no end of, and how far away that is (µm); of several the first.
+    pub fn narrowest(&self) -> Option<([f64; 2], f64)> {
+        let side = |segment: &[u32; 2]| segment.map(|end| self.points[end as usize]);
+        let line = |segment: &[u32; 2]| {
+            let [from, to] = side(segment);
+            GeomWithData::new(Line::new(from, to), *segment)
+        };
+        let tree = RTree::bulk_load(self.segments.iter().map(line).collect());
+        let room = |(place, point): (u32, &[f64; 2])| {
+            let other = tree.nearest_neighbor_iter(*point).find(|segment| !segment.data.contains(&place))?;
+            Some((*point, other.distance_2(point).sqrt()))
+        };
+        (0..).zip(&self.points).filter_map(room).min_by(|a, b| a.1.total_cmp(&b.1))
     }
 }
 
@@ -196,5 +211,15 @@ mod tests {
         let length = |s: &[u32; 2]| distance(sampled.points[s[0] as usize], sampled.points[s[1] as usize]);
         let lengths: Vec<f64> = sampled.segments.iter().map(length).collect();
         assert_eq!(lengths, [1.0, 1.0, 1.0, 0.25, 0.25, 0.25, 0.25]);
+    }
+
+    #[test]
+    fn the_narrowest_place_is_between_sides_that_share_no_point() {
+        let comb =
+            [[[0.0, 0.0], [9.0, 0.0]], [[9.0, 0.0], [9.0, 5.0]], [[4.0, 3.0], [4.0, 0.25]], [[0.0, 0.0], [0.1, 5.0]]];
+        let (point, distance) = Arrangement::new(&comb, 1e-9).narrowest().unwrap();
+        assert_eq!((point, distance), ([4.0, 0.25], 0.25));
+        assert_eq!(Arrangement::new(&comb[..2], 1e-9).narrowest().map(|(_, distance)| distance), Some(5.0));
+        assert_eq!(Arrangement::new(&comb[..1], 1e-9).narrowest(), None);
     }
 }

@@ -82,10 +82,25 @@ pub enum TriangulationError {
         /// A point of it that is outside, or a point of a hole that it covers.
         point: [f64; 2],
     },
-    /// More vertices would be needed than are allowed.
+    /// Sides come so near to one another that cells between them would be too many.
     #[error(
-        "the mesh needs more than {limit} vertices at the size {size} µm; sides that nearly touch may be the cause"
+        "sides come within {distance:.1e} µm of one another at ({:.4}, {:.4}) µm: a mesh without small angles would need more than {limit} \
+         vertices there. Let them touch, move them apart, or ask for a smaller size",
+        point[0],
+        point[1]
     )]
+    Narrow {
+        /// Index of the first outline that goes through the point; none if it is of the domain.
+        outline: Option<usize>,
+        /// Where sides come nearest (µm).
+        point: [f64; 2],
+        /// How near (µm).
+        distance: f64,
+        /// How many vertices may be added to mend angles.
+        limit: usize,
+    },
+    /// More vertices would be needed than are allowed.
+    #[error("the mesh needs more than {limit} vertices at the size {size} µm")]
     TooManyVertices {
         /// Most vertices allowed.
         limit: usize,
@@ -150,8 +165,7 @@ pub fn triangulate_graded(
     if along > options.max_vertices as f64 {
         return Err(TriangulationError::TooManyVertices { limit: options.max_vertices, size: options.size });
     }
-    let constraints = Arrangement::new(&segments, MERGE_TOLERANCE * domain.diameter())
-        .sampled(options.size, |point| grading.size_at(point));
+    let constraints = Arrangement::new(&segments, merged(domain)).sampled(options.size, |point| grading.size_at(point));
     let (vertices, triangles) = refined_triangles(domain, (&constraints, outlines), options, grading)?;
     let (vertices, cells) = kept_and_renumbered(domain, &vertices, &triangles);
     let mut mesh = SimplexMesh::new(vertices, cells)?;
@@ -191,7 +205,7 @@ fn check_options(options: &MeshOptions) -> Result<(), TriangulationError> {
 /// Every point of an outline, and the middle of every piece into which the border cuts its sides, must be inside; and it
 /// may not cover a hole.
 fn check_inside(domain: &PlanarDomain, index: usize, outline: &Outline) -> Result<(), TriangulationError> {
-    let tolerance = 10.0 * MERGE_TOLERANCE * domain.diameter();
+    let tolerance = 10.0 * merged(domain);
     let border: Vec<_> = domain.rings().flat_map(|ring| sides(&ring.points)).collect();
     let refused = |point| Err(TriangulationError::OutlineOutside { outline: index, point });
     let on_border = |point| border.iter().any(|&side| nearest_on_side(side, point).distance <= tolerance);
@@ -222,6 +236,15 @@ fn check_inside(domain: &PlanarDomain, index: usize, outline: &Outline) -> Resul
         Some(&point) => refused(point),
         None => Ok(()),
     }
+}
+
+/// Vertices that may be added to mend angles: so many, and so many for each that size and shapes ask for. Elsewhere they are a few in a hundred;
+/// between sides that nearly touch they go with length over distance.
+const MENDING: [usize; 2] = [20_000, 2];
+
+/// Distance (µm) within which points of a domain and its outlines are one.
+fn merged(domain: &PlanarDomain) -> f64 {
+    MERGE_TOLERANCE * domain.diameter()
 }
 
 /// Vertices, and triangles by their numbers.
@@ -259,11 +282,18 @@ fn refined_triangles(
     for &[from, to] in &constraints.segments {
         cdt.add_constraint_and_split(handle(from), handle(to), |point| point);
     }
+    let (room, limit) = (options.max_vertices - count, MENDING[0] + MENDING[1] * count);
     let parameters = RefinementParameters::new()
         .with_angle_limit(AngleLimit::from_rad(options.min_angle))
-        .with_max_additional_vertices(options.max_vertices.saturating_sub(count));
+        .with_max_additional_vertices(room.min(limit));
     if !cdt.refine(parameters).refinement_complete {
-        return Err(too_many);
+        let narrow = constraints.narrowest().filter(|_| limit <= room);
+        return Err(narrow.map_or(too_many, |(point, distance)| {
+            let through = |outline: &Outline| {
+                sides(&outline.points).any(|side| nearest_on_side(side, point).distance <= merged(domain))
+            };
+            TriangulationError::Narrow { outline: outlines.iter().position(through), point, distance, limit }
+        }));
     }
     let vertices = cdt.vertices().map(|v| [v.position().x, v.position().y]).collect();
     let triangles = cdt.inner_faces().map(|face| face.vertices().map(|v| v.index() as u32)).collect();
@@ -553,6 +583,29 @@ mod tests {
             let refused = triangulate(&pierced, &[cover], &MeshOptions::of_size(10.0)).unwrap_err();
             assert!(matches!(refused, TriangulationError::OutlineOutside { outline: 0, .. }));
         }
+    }
+
+    #[test]
+    fn sides_that_nearly_touch_are_refused_where_they_do_before_they_ask_for_many_vertices() {
+        let domain = PlanarDomain::rectangle(200.0, 150.0);
+        let beside = |gap: f64| {
+            [[40.0, 60.0], [60.0 + gap, 80.0]].map(|[from, to]| Outline::rectangle([from, 40.0], [to, 60.0]))
+        };
+        // Between sides at a distance g vertices are about as far apart: their number goes with 1/g.
+        let meshed = |gap| triangulate(&domain, &beside(gap), &MeshOptions::of_size(15.0));
+        let [apart, near, nearer] = [10.0, 0.02, 0.01].map(|gap| meshed(gap).unwrap().mesh.vertex_count() as f64);
+        assert!(((nearer - apart) / (near - apart) - 2.0).abs() < 0.2, "{apart} {near} {nearer}");
+        let refused = meshed(1e-4).unwrap_err();
+        let TriangulationError::Narrow { outline: Some(0), point, distance, limit: 20_000.. } = refused else {
+            panic!("{refused}")
+        };
+        assert!((distance - 1e-4).abs() < 1e-12 && point[0] == 60.0, "{point:?} {distance}");
+        // The border has no index, and a size at which as many are wanted anyway is served.
+        let slit = Ring { points: vec![[40.0, 1e-4], [60.0, 1e-4], [60.0, 9.0], [40.0, 9.0]], edges: vec![0; 4] };
+        let slit = PlanarDomain::new(domain.outer.clone(), vec![slit], domain.edge_names.clone());
+        let refused = triangulate(&slit, &[], &MeshOptions::of_size(15.0)).unwrap_err();
+        assert!(matches!(refused, TriangulationError::Narrow { outline: None, .. }), "{refused}");
+        assert!(triangulate(&domain, &beside(1e-3), &MeshOptions::of_size(1.0)).is_ok());
     }
 
     #[test]

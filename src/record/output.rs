@@ -164,11 +164,19 @@ pub fn remove_if_there(path: &Path) -> Result<(), WriteError> {
     }
 }
 
-/// Makes a folder for results and tries to write into it, so that a long run does not end in one that cannot be written.
+/// The right to write results into a folder, until it is dropped or the process ends in whatever way.
+#[derive(Debug)]
+#[must_use]
+pub struct Claim {
+    /// The folder, open and locked, where the system locks folders.
+    _folder: Option<fs::File>,
+}
+
+/// Makes a folder for results, claims it, and tries to write into it, so that a long run does not end in one that cannot be written.
 ///
 /// # Errors
-/// The path and the system's reason.
-pub fn prepare_folder(folder: &Path) -> Result<(), WriteError> {
+/// The path and the system's reason; a folder that another process, or another part of this one, has claimed.
+pub fn prepare_folder(folder: &Path) -> Result<Claim, WriteError> {
     if folder.exists() && !folder.is_dir() {
         let source = io::Error::new(io::ErrorKind::NotADirectory, "it is a file, not a folder");
         return Err(WriteError { path: folder.to_owned(), source });
@@ -176,7 +184,16 @@ pub fn prepare_folder(folder: &Path) -> Result<(), WriteError> {
     // A name of its own: another run may try the same folder.
     let trial = folder.join(format!(".trial-{}", std::process::id()));
     write_atomically(&trial, b"")?;
-    fs::remove_file(&trial).map_err(|source| WriteError { path: trial, source })
+    fs::remove_file(&trial).map_err(|source| WriteError { path: trial, source })?;
+    let open = fs::File::open(folder).ok();
+    if open.as_ref().is_some_and(|open| matches!(open.try_lock(), Err(fs::TryLockError::WouldBlock))) {
+        let source = io::Error::new(
+            io::ErrorKind::ResourceBusy,
+            "another run writes into it; another --out is needed, or patience",
+        );
+        return Err(WriteError { path: folder.to_owned(), source });
+    }
+    Ok(Claim { _folder: open })
 }
 
 /// `folder/.name.partial` for `folder/name`.

@@ -243,6 +243,7 @@ impl Meshing<'_> {
                 at_shape(outline, format!("lies outside the tissue at ({:.4}, {:.4}) um", point[0], point[1]))
             }
             TriangulationError::Outline { outline, error } => at_shape(outline, error.to_string()),
+            TriangulationError::Narrow { outline: Some(outline), .. } => at_shape(outline, error.to_string()),
             TriangulationError::NotFitted { outline, area, wanted } => at_shape(
                 outline,
                 format!("is too small or too thin for this tissue: cells cover {area:e} um^2 of its {wanted:e} um^2"),

@@ -46,8 +46,10 @@ pub struct ScenePlan {
     pub expected: Expectation,
     /// Peak of resident memory of a run on one thread (MB).
     pub memory_mb: Estimate,
-    /// CPU seconds of a run on one thread, with what the plan itself has solved.
+    /// CPU seconds of a run on one thread of the reference machine, with what the plan itself has solved.
     pub cpu_seconds: Estimate,
+    /// Seconds that this machine takes for one of the reference machine's, if that was measured.
+    pub pace: Option<f64>,
     /// What the user should know of.
     pub notes: Vec<String>,
 }
@@ -88,6 +90,7 @@ pub fn plan_of(simulation: &Simulation, loaded: &Loaded) -> Result<ScenePlan, Ru
         solved: simulation.counters(),
         memory_mb: memory::estimate(world, &expected, figure.as_ref()),
         cpu_seconds: seconds::estimate(world, &expected, figure.as_ref()),
+        pace: None,
         expected,
         notes: world.resource::<Health>().notes().to_vec(),
     })
@@ -169,12 +172,16 @@ impl fmt::Display for ScenePlan {
         writeln!(f, "  {:<28}{cue_solves} ({cue_factorisations} factorisations)", "cue fields solved")?;
         writeln!(f, "  {:<28}{}, at most {} of cones", "steps", self.steps, self.cone_steps_at_most)?;
         writeln!(f, "  {:<28}at most {}", "points of trajectories", self.trajectory_points_at_most)?;
-        for (name, estimate, unit) in
-            [("memory", &self.memory_mb, "MB"), ("time", &self.cpu_seconds, "s of one thread")]
+        let time = match self.pace {
+            Some(_) => "s of one thread here",
+            None => "s of one thread of the reference machine",
+        };
+        for (name, estimate, unit, scale) in
+            [("memory", &self.memory_mb, "MB", 1.0), ("time", &self.cpu_seconds, time, self.pace.unwrap_or(1.0))]
         {
-            let largest = estimate.parts.iter().take(3).map(|part| format!("{} {:.2}", part.name, part.amount));
+            let largest = estimate.parts.iter().take(3).map(|part| format!("{} {:.2}", part.name, scale * part.amount));
             let largest = largest.collect::<Vec<_>>().join(", ");
-            writeln!(f, "  {name:<28}about {:.2} {unit}: {largest}", estimate.total)?;
+            writeln!(f, "  {name:<28}about {:.2} {unit}: {largest}", scale * estimate.total)?;
         }
         writeln!(f, "derived")?;
         for (population, constants) in &self.derived {

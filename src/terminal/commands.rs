@@ -16,6 +16,7 @@ use crate::scenario::schema::top_keys;
 use crate::study::ablation::{self, Extent};
 use crate::study::bench;
 use crate::study::chart;
+use crate::study::estimate::yardstick;
 use crate::study::laboratory::Laboratory;
 use crate::study::plan::plan;
 use crate::study::report::Asked;
@@ -33,6 +34,7 @@ use std::process::ExitCode;
 /// Why there are no results, or not all of them.
 pub fn run_plan(scene: &SceneArguments, json: bool, roster: &Roster) -> Result<ExitCode, RunError> {
     let mut found = plan(&scene.load(roster)?, roster, &scene.path())?;
+    found.pace = yardstick::pace();
     let admitted = scene.memory.admit(&found.scene, &found.memory_mb, 1);
     found.notes.extend(admitted.err().map(|refusal| refusal.to_string()));
     if json {
@@ -121,7 +123,7 @@ pub fn run_ablation(
     let loaded = scene.load(roster)?;
     admit_many(scene, &loaded, roster, u64::MAX)?;
     let folder = folder_of(out, &format!("{}-ablation", loaded.scene.name));
-    prepare_folder(&folder)?;
+    let _claim = prepare_folder(&folder)?;
     let bar = progress_bar(100.0, "%");
     let tick = |share| bar.set_position((share * 1000.0) as u64);
     let interrupt = Interrupt::catch().map_err(|error| RunError::Internal(error.to_string()))?;
@@ -151,7 +153,7 @@ pub fn run_chart(
     let loaded = laboratory.scene()?;
     let name = format!("{}-chart", loaded.scene.name);
     let folder = folder_of(out, &name);
-    prepare_folder(&folder)?;
+    let _claim = prepare_folder(&folder)?;
     let bar = progress_bar(100.0, "%");
     let chart = chart::chart(laboratory, only, &|share| bar.set_position((share * 1000.0) as u64))?;
     bar.finish_and_clear();
@@ -177,7 +179,7 @@ pub fn run_chart(
 /// Why there are no results, or not all of them.
 pub fn run_bench(laboratory: &Laboratory, out: Option<&PathBuf>, axons: &[u64]) -> Result<ExitCode, RunError> {
     let folder = folder_of(out, &format!("{}-bench", laboratory.scene()?.scene.name));
-    prepare_folder(&folder)?;
+    let _claim = prepare_folder(&folder)?;
     let bar = progress_bar(100.0, "%");
     let found = bench::bench(laboratory, axons, &|share| bar.set_position((share * 1000.0) as u64))?;
     bar.finish_and_clear();
@@ -192,7 +194,7 @@ pub fn run_bench(laboratory: &Laboratory, out: Option<&PathBuf>, axons: &[u64]) 
 /// # Errors
 /// Why there are no results, or not all of them.
 pub fn run_stability(folder: &Path, roster: &Roster) -> Result<ExitCode, RunError> {
-    prepare_folder(folder)?;
+    let _claim = prepare_folder(folder)?;
     let bar = progress_bar(100.0, "%");
     let maps = Stability::compute(roster, |share| bar.set_position((share * 1000.0) as u64))?;
     bar.finish_and_clear();

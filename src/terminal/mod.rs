@@ -38,7 +38,7 @@ use manners::{alarming, completions, drawn, man_page};
 use running::{resume, run_once};
 use std::ffi::OsString;
 use std::process::ExitCode;
-use voice::{alarm, set_voice, unsaid};
+use voice::{alarm, printed, set_voice, unsaid};
 
 /// Runs the program with a roster of mechanisms: the whole of `main`, also for programs that add their own.
 pub fn run(arguments: impl IntoIterator<Item = impl Into<OsString> + Clone>, roster: Roster) -> ExitCode {
@@ -46,10 +46,13 @@ pub fn run(arguments: impl IntoIterator<Item = impl Into<OsString> + Clone>, ros
     let words = words(&arguments);
     let cli = match Cli::try_parse_from(manners_last(arguments)) {
         Ok(cli) => Cli { words, ..cli },
-        Err(error) => {
-            // Nothing can be done about a standard output that is gone.
+        Err(error) if error.use_stderr() => {
             let _ = error.print();
-            return ExitCode::from(if error.use_stderr() { 2 } else { 0 });
+            return ExitCode::from(2);
+        }
+        Err(help) => {
+            printed(help.print());
+            return told(ExitCode::SUCCESS);
         }
     };
     set_voice(cli.quiet, cli.verbose);
@@ -58,6 +61,11 @@ pub fn run(arguments: impl IntoIterator<Item = impl Into<OsString> + Clone>, ros
         alarm!("{} {account}", alarming("error:"));
         ExitCode::from(if matches!(error, RunError::Scenario(_) | RunError::Arguments(_)) { 2 } else { 1 })
     });
+    told(code)
+}
+
+/// The exit code of what ended with one, which is no success if standard output did not take what was said.
+fn told(code: ExitCode) -> ExitCode {
     match unsaid() {
         Some(reason) if code == ExitCode::SUCCESS => {
             alarm!("{} standard output: {reason}", alarming("error:"));
@@ -136,7 +144,7 @@ fn execute(cli: &Cli, roster: &Roster) -> Result<ExitCode, RunError> {
     }
     let loaded = cli.scene.load(roster)?;
     let folder = folder_of(cli.out.as_ref(), &loaded.scene.name);
-    prepare_folder(&folder)?;
+    let _claim = prepare_folder(&folder)?;
     match cli.seeds {
         None => run_once(
             (Asked { loaded: &loaded, command: &cli.words }, &cli.scene.path()),

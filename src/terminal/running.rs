@@ -61,7 +61,7 @@ pub fn resume((folder, room): (&Path, Room), roster: &Roster, interval: Option<f
     };
     refused.iter().for_each(|reason| alarm!("warning: {reason}; the one before it is used"));
     room.admit(&loaded.scene.name, &memory_of(&run.simulation, &loaded, Records::ALL)?, 1)?;
-    prepare_folder(folder)?;
+    let _claim = prepare_folder(folder)?;
     note!("{}: resumed at t = {} h", loaded.scene.name, run.simulation.time());
     let asked = Asked { loaded: &loaded, command: &command };
     let checkpoints = Checkpoints::new(folder, interval.or(own), (asked, &path));

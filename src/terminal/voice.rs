@@ -22,6 +22,11 @@ pub fn bytes_out(bytes: &[u8]) {
     keep_reason(out.write_all(bytes).and_then(|()| out.flush()));
 }
 
+/// Takes note of how somebody else's writing on standard output went.
+pub fn printed(written: std::io::Result<()>) {
+    keep_reason(written.and_then(|()| stdout().flush()));
+}
+
 /// Keeps the first reason why something could not be written.
 fn keep_reason(written: std::io::Result<()>) {
     if let Err(error) = written.map_err(|error| (error.kind(), error.to_string()))

@@ -59,7 +59,11 @@ fn add_polygon(rings: &[Value], place: &str, found: &mut Found) -> Result<(), St
     for (i, ring) in rings.iter().enumerate() {
         let place = format!("{place}/{i}");
         let entries = ring.as_array().ok_or_else(|| format!("{place}: not a list of points"))?;
-        found.rings.push(FoundRing { points: points(entries, &place)?, names: Vec::new() });
+        let ring = FoundRing { points: points(entries, &place)?, names: Vec::new() };
+        if found.rings.first().is_some_and(|border| ring.area() > border.area()) {
+            return Err(format!("{place}: a hole with a larger area than the polygon's border, which comes first"));
+        }
+        found.rings.push(ring);
     }
     Ok(())
 }
@@ -95,6 +99,10 @@ mod tests {
             (r#"{"a": 1}"#, "is this GeoJSON?"),
             (r#"{"type": "Point"}"#, "\"Point\" is not taken"),
             (r#"{"type": "Polygon", "coordinates": [[[0, "x"]]]}"#, "/coordinates/0/0: [0,\"x\"] is not a point"),
+            (
+                r#"{"type": "Polygon", "coordinates": [[[1, 1], [2, 1], [2, 2]], [[0, 0], [9, 0], [9, 9]]]}"#,
+                "/coordinates/1: a hole with a larger area",
+            ),
             (r#"{"type": "LineString", "coordinates": []}"#, "needs the property `name`"),
             (r#"{"type": "MultiPolygon", "coordinates": [[], []]}"#, "2 polygons where one belongs"),
             (r#"{"type": "FeatureCollection"}"#, "no list `features`"),

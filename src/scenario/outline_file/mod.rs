@@ -14,6 +14,7 @@ use super::read::{NO_FILE, read_text};
 use crate::keys;
 use crate::model::quantity::Length;
 use crate::model::violation::Violation;
+use crate::numerics::polygon::signed_area;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
@@ -84,6 +85,13 @@ struct Found {
 struct FoundRing {
     points: Vec<[f64; 2]>,
     names: Vec<Option<String>>,
+}
+
+impl FoundRing {
+    /// Area inside, in units of the file squared.
+    fn area(&self) -> f64 {
+        signed_area(&self.points).abs()
+    }
 }
 
 /// Puts the polygon of the file in the place of `/tissue/outline` if that names one; `folder` is that of the scenario with the key.

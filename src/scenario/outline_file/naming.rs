@@ -1,7 +1,7 @@
 //! Which closed line is the outer border, and what the sides are called by the lines along them.
 
 use super::{Found, FoundRing};
-use crate::numerics::polygon::{SideTree, contains_or_touches, signed_area};
+use crate::numerics::polygon::{SideTree, contains_or_touches};
 
 /// Lines name a side up to this share of the outline's extent away from it.
 const REACH: f64 = 1e-5;
@@ -16,8 +16,7 @@ pub(super) fn named(found: Found) -> Result<Vec<FoundRing>, String> {
     if rings.iter().flat_map(|ring| &ring.points).flatten().any(|x| !x.is_finite()) {
         return Err("a coordinate is not finite".to_owned());
     }
-    let area = |ring: &FoundRing| signed_area(&ring.points).abs();
-    rings.sort_by(|a, b| area(b).total_cmp(&area(a)));
+    rings.sort_by(|a, b| b.area().total_cmp(&a.area()));
     let Some(outer) = rings.first() else { return Err("no closed line in it: an outline is a polygon".to_owned()) };
     if let Some(place) = rings[1..].iter().position(|ring| !contains_or_touches(&outer.points, ring.points[0])) {
         let [x, y] = rings[1 + place].points[0];

@@ -1,12 +1,14 @@
-//! What a run will take, from counts alone: no clock is read and nothing is tried, so an estimate is the same everywhere.
+//! What a run will take, from counts alone: nothing is tried, so an estimate is the same everywhere.
 //!
 //! The parts of a scene have told its [`Plan`] what they hold in memory and what they do how often, for each axon, stored vertex,
 //! step or stage. How many of these there will be is an [`Expectation`]; how long one of them takes stands in [`seconds`], how much
-//! memory the program takes besides in [`memory`]. What is known before a scene is put together: [`outlook`].
+//! memory the program takes besides in [`memory`]. What is known before a scene is put together: [`outlook`]. How fast a machine is beside the one
+//! that the seconds are of: [`yardstick`], the only part that reads a clock.
 
 pub mod memory;
 pub mod outlook;
 pub mod seconds;
+pub mod yardstick;
 
 use crate::model::clock::Clock;
 use crate::model::components::{GrowthCone, Site};
@@ -62,7 +64,7 @@ impl Estimate {
 
 /// How much there will be of what costs something.
 ///
-/// A cone of a scene with targets and with cues that turn cones is expected to reach the nearest target by a way half as long
+/// A cone of a scene with targets and with cues that turn cones, or stiffness that does, is expected to reach the nearest target by a way half as long
 /// again as the straight line, another one to grow to the end of the run; axons evenly spread, the tissue at rest.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Expectation {
@@ -86,7 +88,8 @@ pub struct Expectation {
     pub drawn_vertices: f64,
     /// Bytes of the recording in memory, before it is deflated.
     pub recording_bytes: f64,
-    /// How much denser axons lie on their way than if they grew evenly spread: those that targets draw in.
+    /// How much denser axons lie on their way than if they grew evenly spread in the tissue at rest: targets draw them in, growth of the tissue
+    /// draws them apart.
     pub crowding: f64,
 }
 
@@ -133,7 +136,7 @@ impl Expectation {
             pictures: pictures.len(),
             drawn_vertices: pictures.iter().map(|&instant| vertices_at(instant)).sum(),
             recording_bytes: if film.frames > 0.0 { film.bytes(world) } else { 0.0 },
-            crowding: crowding(world, clock, &goals),
+            crowding: crowding(world, clock, &goals) / (1.0 + world.resource::<Plan>().swelling),
         }
     }
 
@@ -192,7 +195,7 @@ fn middle_and_side(points: &[[f64; 2]]) -> Option<([f64; 2], f64)> {
 
 /// Vertices of the targets (µm, at rest) if anything leads to them.
 fn goals(world: &World) -> Vec<[f64; 2]> {
-    if world.resource::<Observables>().effects.is_empty() {
+    if world.resource::<Observables>().effects.is_empty() && !world.resource::<Plan>().leads {
         return Vec::new();
     }
     let mesh = &world.resource::<Tissue>().mesh;

@@ -1,7 +1,7 @@
 //! The estimate of time: CPU seconds of one thread for a whole run, what is solved before the first step included.
 //!
-//! Counts times the nanoseconds below, which were measured on the reference machine (two shared x86-64 cores, nothing beside) on 2026-11-24 and
-//! are good for a quarter each way there; other machines are slower or faster as a whole.
+//! Counts times the nanoseconds below, which were measured on the reference machine (two shared x86-64 cores, nothing beside) on 2026-11-24,
+//! those of contact in proportion to it on 2026-11-29. By how much another machine is slower or faster as a whole: [`yardstick`](super::yardstick).
 
 use super::{Estimate, Expectation, done};
 use crate::model::observables::{Effect, Observables};
@@ -46,8 +46,8 @@ pub(super) fn unit(work: Work) -> f64 {
         Work::WatchedCell => 6.0,
         Work::Sampled => 17.5,
         Work::BorderFacet => 0.09,
-        Work::Neighbourhood => 610.0,
-        Work::EvenSegment => 117.0,
+        Work::Neighbourhood => 800.0,
+        Work::EvenSegment => 55.0,
         Work::Indexed => 480.0,
     }
 }
@@ -65,11 +65,17 @@ pub fn estimate(world: &World, expected: &Expectation, figure: Option<&PictureSi
         let effects = &world.resource::<Observables>().effects;
         let shown = |effect| f64::from(effects.values().any(|other| *other == effect));
         let field = TISSUE_PIXEL + CUE_PIXEL * (shown(Effect::Attract) + shown(Effect::Repel));
-        let pixels = PAGE_PIXEL * figure.page + field * figure.field * expected.pictures as f64;
+        let pixels = PAGE_PIXEL * figure.page
+            + field * figure.field * expected.pictures as f64 * shown_of(world.resource::<Plan>().swelling);
         estimate.add("figure", FIGURE + pixels + DRAWN_VERTEX * expected.drawn_vertices);
     }
     estimate.parts.iter_mut().for_each(|part| part.amount /= SECOND);
     estimate.summed()
+}
+
+/// Area of the tissue in a panel, in the mean, over that in the panel where it is largest, if it grows or shrinks evenly by so much in the mean.
+fn shown_of(swelling: f64) -> f64 {
+    (1.0 + swelling) / (1.0 + 2.0 * swelling.max(0.0))
 }
 
 /// What a scene takes for the run and for each of what there are many of (ns of one thread), to compare settings by before it is known

@@ -269,7 +269,8 @@ fn solve(world: &World, cues: &[(&str, &Cue)]) -> Result<Solved, InstallError> {
     let tissue = world.resource::<Tissue>();
     let mesh = &*tissue.mesh;
     let goal = Refinement { tolerance: LEVEL_TOLERANCE, max_levels: MOST_LEVELS };
-    let mut solvers = FieldSolvers::new(mesh, tissue.regions.values().cloned().collect());
+    let room = world.resource::<Plan>().room_left();
+    let mut solvers = FieldSolvers::new(mesh, tissue.regions.values().cloned().collect()).within(room);
     let loading = world.get_resource::<Loading>();
     let clock = world.resource::<Clock>();
     let at_load =

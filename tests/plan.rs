@@ -5,6 +5,8 @@ mod common;
 use common::{ended, hash_of_states, loaded};
 use serde_json::{Value, json};
 use std::path::Path;
+use tropism::model::plan::Plan;
+use tropism::simulation::Simulation;
 use tropism::study::estimate::Estimate;
 use tropism::study::plan::{ScenePlan, plan};
 use tropism::systems;
@@ -214,6 +216,30 @@ fn a_tissue_that_grows_draws_axons_apart() {
     // Free to grow: edges go as 1 + 0.2 s, and the area's mean over four instants s is 1 + 0.4/2 + 0.04 · 21/64.
     let ratio = crowding(1.0 + 1e-9) / crowding(1.2);
     assert!((ratio / (1.2 + 0.04 * 21.0 / 64.0) - 1.0).abs() < 1e-6, "{ratio}");
+}
+
+#[test]
+fn fields_whose_levels_do_not_fit_are_given_up_while_they_are_solved() {
+    let roster = systems::standard();
+    for transport in ["diffusing", "transient"] {
+        let scene = changed(|scene| scene["cues"]["read"]["transport"] = json!(transport));
+        let within = |room: f64| {
+            let mut scene = loaded(&scene, &roster);
+            scene.room = Some(room);
+            Simulation::assemble(&scene, &roster).map(|simulation| simulation.world().resource::<Plan>().clone())
+        };
+        let plan = within(1e9).unwrap();
+        let held = |name: &str| plan.holdings.iter().find(|held| held.name == name).map(|held| held.bytes);
+        let (matrix, cue) = (held("matrix").unwrap(), held("cue `read`").unwrap());
+        assert!(within(matrix + cue).is_ok(), "{transport}");
+        // What stands at a moment is held beside the levels, and is less than half as much as two of these.
+        let refused = within(matrix + 0.7 * cue).map(|_| ()).unwrap_err().to_string();
+        let words = "cue `read` (eq. 2, /cues/read): its first ";
+        assert!(
+            refused.starts_with(words) && refused.contains(" levels take more memory than is left, 0.00 GB"),
+            "{refused}"
+        );
+    }
 }
 
 #[test]

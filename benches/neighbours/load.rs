@@ -77,7 +77,7 @@ impl Load {
     pub fn find(&self, neighbours: &mut impl Neighbours) -> Found {
         let mut found = Found::default();
         for (axon, &tip) in (0..).zip(&self.tips) {
-            neighbours.near(tip, |vertex| {
+            neighbours.near(axon, tip, |vertex| {
                 if let Some(distance) = self.distance(vertex as usize, axon, tip) {
                     found.count += 1;
                     found.distances += (1e6 * distance).round() as u64;

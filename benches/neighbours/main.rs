@@ -1,4 +1,4 @@
-//! What finding the neighbours of growth cones costs with four structures, by themselves: `cargo bench --bench neighbours`, or
+//! What finding the neighbours of growth cones costs with six structures, by themselves: `cargo bench --bench neighbours`, or
 //! `cargo bench --bench neighbours -- 1000 20000` for other numbers of axons.
 //!
 //! Load: axons start one in 30 µm by 30 µm of a square with walls that reflect, and are numbered along a Morton curve, so that neighbours
@@ -13,10 +13,12 @@
 //! - *grid, asked*: cells of the reach and the longest segment, each with the vertices in it; a cone looks at 3 by 3 of them.
 //! - *grid, lists*: squares of three reaches; a vertex is put into the lists of all squares near it as it is laid, and a cone looks at the list
 //!   of its square.
+//! - *tree, skins*; *grid, skins*: a list for each cone of what lies within the reach and a skin as wide about where it was, made by asking the tree or the cells
+//!   when it has gone by the skin; what is laid meanwhile is added to the lists of the cones near it.
 //!
 //! The lists are plain: vertices by number, without the parts of squares that `systems/shaft_index.rs` has. What is looked at is judged by the
 //! same function, which drops a segment that begins too far off before it looks for its end. Seconds are CPU time of one thread, those of
-//! asking with the lists that are made on the way; medians of three up to 10 000 axons, one run each beyond, the four in turn.
+//! asking with the lists that are made on the way; medians of three up to 10 000 axons, one run each beyond, the six in turn.
 
 #[path = "../shared/cpu.rs"]
 mod cpu;
@@ -25,7 +27,7 @@ mod structures;
 
 use cpu::cpu_seconds;
 use load::{Found, Load};
-use structures::{Cells, Everything, GridLists, Neighbours, Tree, TreeLists};
+use structures::{Cells, Everything, GridLists, Neighbours, Skins, Tree, TreeLists};
 
 /// Numbers of axons where none are given.
 const AXONS: [usize; 4] = [1_000, 10_000, 100_000, 1_000_000];
@@ -52,11 +54,13 @@ fn main() {
 
 /// Times all structures with a number of axons, sees that they find the same, and prints a line for each.
 fn compare(axons: usize) {
-    let structures: [(&str, Runner); 4] = [
+    let structures: [(&str, Runner); 6] = [
         ("tree, asked", run::<Tree>),
         ("tree, lists", run::<TreeLists>),
         ("grid, asked", run::<Cells>),
         ("grid, lists", run::<GridLists>),
+        ("tree, skins", run::<Skins<Tree>>),
+        ("grid, skins", run::<Skins<Cells>>),
     ];
     let repetitions = if axons <= REPEATED { REPETITIONS } else { 1 };
     let mut runs = structures.map(|_| Vec::new());

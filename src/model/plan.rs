@@ -158,6 +158,9 @@ pub struct Plan {
     /// By how much larger the tissue is than at rest, in the mean over the run: area over area, minus 1.
     #[serde(skip)]
     pub swelling: f64,
+    /// Bytes that all that is held to the end of the run may take, if that is bounded.
+    #[serde(skip)]
+    pub room: Option<f64>,
     /// Whether something besides cues leads cones to where targets may lie.
     #[serde(skip)]
     pub leads: bool,
@@ -194,6 +197,12 @@ impl Plan {
     /// Notes memory that a part holds.
     pub fn hold(&mut self, name: impl Into<String>, bytes: f64, each: Each) {
         self.holdings.push(Holding { name: name.into(), bytes, each });
+    }
+
+    /// Bytes that are left for what is held to the end of the run; infinite if there is no bound.
+    pub fn room_left(&self) -> f64 {
+        let held = self.holdings.iter().filter(|held| held.each == Each::Run).map(|held| held.bytes);
+        self.room.map_or(f64::INFINITY, |room| room - held.sum::<f64>())
     }
 
     /// Notes work that a part does.

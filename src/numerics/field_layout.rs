@@ -76,6 +76,16 @@ impl FieldLayout {
         }
     }
 
+    /// Numbers of a field.
+    pub fn components(&self, mesh: &SimplexMesh<2>) -> usize {
+        match self {
+            Self::Vertices => STRIDE * mesh.vertex_count(),
+            Self::Cells(vertices) => vertices + 2 * mesh.cell_count(),
+            Self::Nodes(nodes) => STRIDE * nodes.count(),
+            Self::Corners(nodes) => nodes.count() + 6 * mesh.cell_count(),
+        }
+    }
+
     /// c of the unknowns, vertices first.
     pub fn concentrations<'v>(&self, values: &'v [f64]) -> impl Iterator<Item = f64> + use<'v> {
         let (count, stride) = match self {

@@ -57,6 +57,16 @@ pub enum FieldPathError {
         /// The tolerance.
         tolerance: f64,
     },
+    /// The levels of a field take more memory than there is for them.
+    #[error(
+        "its first {levels} levels take more memory than is left, {gigabytes:.2} GB: a coarser `mesh_size` takes less"
+    )]
+    NoRoom {
+        /// Levels held.
+        levels: usize,
+        /// What was left for all of them (GB).
+        gigabytes: f64,
+    },
     /// A field in time needs too many levels.
     #[error(
         "{levels} levels in time reach no farther than {time:.6} h; each corner of the tissue's load and of the release takes two, and of the others a larger `time_tolerance` needs fewer"
@@ -72,11 +82,33 @@ pub enum FieldPathError {
 /// Vertex coordinates (µm) at a load and their derivative with respect to it.
 pub type Configurations<'a> = &'a dyn Fn(f64) -> (Vec<[f64; 2]>, Vec<[f64; 2]>);
 
+/// Bytes in a gigabyte.
+const GIGABYTE: f64 = 1e9;
+
+/// Bytes that levels of fields may take in all.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Room(f64);
+
+impl Room {
+    /// Refuses so many levels, of so many components with a value and a slope each, if they take more.
+    pub(crate) fn demand(self, levels: usize, components: usize) -> Result<(), FieldPathError> {
+        match Self::of(levels, components) <= self.0 {
+            true => Ok(()),
+            false => Err(FieldPathError::NoRoom { levels, gigabytes: self.0.max(0.0) / GIGABYTE }),
+        }
+    }
+
+    fn of(levels: usize, components: usize) -> f64 {
+        (2 * size_of::<f64>()) as f64 * levels as f64 * components as f64
+    }
+}
+
 /// The solvers of one mesh, set up when a field first needs them.
 #[derive(Debug)]
 pub struct FieldSolvers<'m> {
     mesh: &'m SimplexMesh<2>,
     regions: Vec<Vec<u32>>,
+    pub(crate) room: Room,
     linear: Option<(StationarySolver<'m, 2>, GradientRecovery<2>)>,
     quadratic: Option<QuadraticSolver<'m, 2>>,
 }
@@ -84,7 +116,17 @@ pub struct FieldSolvers<'m> {
 impl<'m> FieldSolvers<'m> {
     /// None yet, on `mesh`; `regions` are all that are ever a source.
     pub fn new(mesh: &'m SimplexMesh<2>, regions: Vec<Vec<u32>>) -> Self {
-        Self { mesh, regions, linear: None, quadratic: None }
+        Self { mesh, regions, room: Room(f64::INFINITY), linear: None, quadratic: None }
+    }
+
+    /// The same for fields whose levels may take so many bytes in all; one that needs more is an error.
+    pub fn within(self, room: f64) -> Self {
+        Self { room: Room(room), ..self }
+    }
+
+    /// Takes the room of a path for good.
+    pub(crate) fn keep(&mut self, path: &HermitePath) {
+        self.room.0 -= Room::of(path.levels().len(), path.components());
     }
 
     /// Factorisations and solves done so far.
@@ -209,6 +251,7 @@ impl FieldProblem<'_> {
         let at_rest = bound.map(|_| self.nodal(solvers, self.mesh.vertices(), None)).transpose()?;
         let (mut flipped_from, mut monotonicity) = (None::<f64>, None::<Monotonicity>);
         let defect = |a: &[f64], b: &[f64]| layout.gradient_defect(self.mesh, (a, b), FLAT);
+        let mut solved = 0;
         let mut level = |load: f64, at: &[[f64; 2]], motion: Option<&[[f64; 2]]>| {
             let Level { found, flipped, edges } = match self.order {
                 Order::Linear => self.linear_level(solvers, &layout, (at, motion), at_rest.as_ref())?,
@@ -218,6 +261,8 @@ impl FieldProblem<'_> {
                 flipped_from = Some(flipped_from.map_or(load, |first| first.min(load)));
             }
             monotonicity = edges.map(|edges| monotonicity.map_or(edges, |worst| worst.worse(edges)));
+            solved += 1;
+            solvers.room.demand(solved, found.0.len())?;
             Ok::<_, FieldPathError>(found)
         };
         let (path, report) = match configurations {
@@ -230,6 +275,7 @@ impl FieldProblem<'_> {
                 refine(&[0.0, 0.5, 1.0], evaluate, defect, goal)?
             }
         };
+        solvers.keep(&path);
         Ok(FieldPath { path, along: Along::Load, layout, report, flipped_from, monotonicity })
     }
 

@@ -23,7 +23,7 @@
 use crate::numerics::carried_field::{volume_rates_around, volumes_around};
 use crate::numerics::cue_element::{Element, Mass, ReactionDiffusion};
 use crate::numerics::delaunay::Monotonicity;
-use crate::numerics::field_path::{Along, Configurations, FieldPath, FieldPathError, FieldProblem, FieldSolvers};
+use crate::numerics::field_path::{Along, Configurations, FieldPath, FieldPathError, FieldProblem, FieldSolvers, Room};
 use crate::numerics::hermite::{HermitePath, Level, RefinementReport};
 use crate::numerics::reaction_diffusion::{
     ReactionDiffusionError, StationarySolver, StationarySystem, check_length, source_load,
@@ -106,12 +106,14 @@ pub fn solve_in_time<'m>(
     course: &Course,
 ) -> Result<FieldPath, FieldPathError> {
     let layout = problem.layout(solvers)?;
+    let room = (solvers.room, layout.components(problem.mesh));
     let (solver, recovery) = solvers.linear()?;
     let mut march = March {
         problem,
         solver,
         configurations,
         course,
+        room,
         factored: None,
         releasing: false,
         largest: 0.0,
@@ -129,6 +131,7 @@ pub fn solve_in_time<'m>(
     let path = HermitePath::new(nodal.into_iter().map(with_gradients).collect())?;
     let report = RefinementReport { solves: march.steps, worst_defect: march.worst, met: true };
     let March { flipped_from, monotonicity, .. } = march;
+    solvers.keep(&path);
     Ok(FieldPath { path, along: Along::Time, layout, report, flipped_from, monotonicity })
 }
 
@@ -146,6 +149,8 @@ struct March<'s, 'm> {
     solver: &'s mut StationarySolver<'m, 2>,
     configurations: Option<Configurations<'s>>,
     course: &'s Course,
+    /// What levels may take, and the numbers of one.
+    room: (Room, usize),
     /// The last system, with the step that it was made for.
     factored: Option<(f64, StationarySystem<'m, 2>)>,
     releasing: bool,
@@ -161,7 +166,8 @@ struct March<'s, 'm> {
 impl March<'_, '_> {
     fn run(&mut self) -> Result<Vec<Level>, FieldPathError> {
         let breaks = self.course.breaks();
-        let mut levels = Levels { stored: Vec::new(), between: Vec::new(), most: self.course.most_levels };
+        let mut levels =
+            Levels { stored: Vec::new(), between: Vec::new(), most: self.course.most_levels, room: self.room };
         let mut state = self.start()?;
         for (piece, ends) in breaks.windows(2).enumerate() {
             let (from, to) = (ends[0], ends[1]);
@@ -363,6 +369,7 @@ struct Levels {
     stored: Vec<Level>,
     between: Vec<Level>,
     most: usize,
+    room: (Room, usize),
 }
 
 impl Levels {
@@ -389,6 +396,8 @@ impl Levels {
             if self.stored.len() >= self.most {
                 return Err(FieldPathError::TooManyLevels { levels: self.most, time: last.parameter });
             }
+            let (room, components) = self.room;
+            room.demand(self.stored.len() + 1, components)?;
             self.stored.push(last);
         }
         self.between.clear();

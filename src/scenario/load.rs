@@ -52,6 +52,8 @@ pub struct Loaded {
     pub hints: Vec<Violation>,
     /// What those who changed the scene since have to say of it; it becomes notes of its runs.
     pub remarks: Vec<String>,
+    /// Bytes that what is solved before the first step may take, if that is bounded.
+    pub room: Option<f64>,
     /// The directory of the file, to which paths in blocks are relative.
     pub directory: PathBuf,
 }
@@ -117,7 +119,15 @@ fn check(chain: &[Document], request: &Request, blocks: &[BlockSchema]) -> Resul
     match scene {
         Some(scene) if draft.problems.is_empty() => {
             let directory = request.path.parent().map(Path::to_path_buf).unwrap_or_default();
-            Ok(Loaded { scene, blocks, merged: draft.document, hints: draft.hints, remarks: Vec::new(), directory })
+            Ok(Loaded {
+                scene,
+                blocks,
+                merged: draft.document,
+                hints: draft.hints,
+                remarks: Vec::new(),
+                room: None,
+                directory,
+            })
         }
         _ => Err(ScenarioErrors { path: request.path.clone(), problems: draft.problems }),
     }

@@ -62,6 +62,7 @@ pub(super) fn assemble(loaded: &Loaded, roster: &Roster, shelf: &Shelf) -> Resul
     world.init_resource::<Counters>();
     world.init_resource::<Health>();
     world.init_resource::<Observables>();
+    world.insert_resource(Plan { room: loaded.room, ..Plan::default() });
     world.insert_resource(shelf.clone());
     world.insert_resource(roster.materials().clone());
     world.insert_resource(clock(scene)?);

@@ -70,6 +70,16 @@ impl Room {
         self.admit(&scene.name, &outlook(scene), 1)
     }
 
+    /// Bytes that axons and mesh of a scene, before anything is made of it, leave to what is solved, if there is a bound.
+    pub fn beside(self, scene: &Scene) -> Option<f64> {
+        let bytes = match self {
+            Self::Any => return None,
+            Self::Given(bytes) => bytes - memory_mib("VmRSS:").unwrap_or_default() * MEBIBYTE,
+            Self::Free => free(Path::new("/"))?.0,
+        };
+        Some(bytes - outlook(scene).total * MEGABYTE)
+    }
+
     /// Lets a scene through that needs `estimate` (MB), `at_once` times.
     ///
     /// # Errors

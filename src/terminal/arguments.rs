@@ -193,10 +193,11 @@ impl SceneArguments {
     /// The scene with the keys that its accuracy asks for, and the request that gives it.
     pub fn settled(&self, roster: &Roster) -> Result<(Request, Loaded), RunError> {
         let request = Request { path: self.path(), without: self.without.clone(), set: self.set.clone() };
-        let (request, loaded) = accuracy::settled(&request, roster, |read| self.memory.admit_outlook(&read.scene))?;
+        let (request, mut loaded) = accuracy::settled(&request, roster, |read| self.memory.admit_outlook(&read.scene))?;
         for hint in &loaded.hints {
             note!("hint: {hint}");
         }
+        loaded.room = self.memory.beside(&loaded.scene);
         Ok((request, loaded))
     }
 

@@ -11,7 +11,7 @@ use super::cue_keys::region;
 pub use super::cue_keys::{Cue, Element, Gradient, Mass, Release, Start, Transport};
 use super::matrix::Loading;
 use crate::model::observables::{Observable, Observables};
-use crate::numerics::field_path::{Along, FieldPath, FieldProblem, FieldSolvers, Order};
+use crate::numerics::field_path::{Along, FieldPath, FieldPathError, FieldProblem, FieldSolvers, Order};
 use crate::numerics::hermite::{HermiteWeights, Refinement};
 use crate::numerics::reaction_diffusion::Mass as MassMatrix;
 use crate::numerics::simplex_mesh::SimplexMesh;
@@ -316,8 +316,12 @@ fn report(world: &mut World, (name, cue): (&str, &Cue), field: &FieldPath) {
     }
 }
 
-fn failed(cue: &str, error: impl std::fmt::Display) -> InstallError {
-    InstallError::Solve(format!("cue `{cue}` (eq. 2, /cues/{cue}): {error}"))
+fn failed(cue: &str, error: FieldPathError) -> InstallError {
+    let account = format!("cue `{cue}` (eq. 2, /cues/{cue}): {error}");
+    match error {
+        FieldPathError::NoRoom { .. } => InstallError::NoRoom(account),
+        _ => InstallError::Solve(account),
+    }
 }
 
 /// Edges may be this much longer than advised: meshes come out a little coarser than asked for.

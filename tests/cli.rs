@@ -385,10 +385,11 @@ fn a_scene_that_does_not_fit_into_memory_is_refused_before_anything_is_made_of_i
 fn the_room_of_a_run_can_be_said_and_a_refused_run_writes_no_results() {
     let folder = with_scene(&scene());
     let with = |size: &str, more: &[&str]| tropism(&folder, &[&["scene.json", "--memory", size], more].concat());
-    // Axons and mesh alone would fit into 1 MB: it is the plan that does not.
+    // Axons and mesh alone would fit into 1 MB: it is the field that does not.
     let output = with("1MB", &[]);
     assert_eq!(code(&output), 2, "{}", errors(&output));
-    assert!(errors(&output).contains("`--memory` allows 1.0 MB"), "{}", errors(&output));
+    let words = "does not fit into memory: cue `attractant` (eq. 2, /cues/attractant): levels of its field, 1 so far";
+    assert!(errors(&output).contains(words), "{}", errors(&output));
     assert!(!folder.0.join("out/scene/summary.json").exists());
     for size in ["any", "1TB"] {
         assert_eq!(code(&with(size, &[])), 0, "{size}");

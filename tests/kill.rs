@@ -255,6 +255,35 @@ fn a_signal_within_a_long_step_or_a_long_mesh_is_heard_at_once_if_it_is_the_seco
 }
 
 #[test]
+fn signals_that_come_together_are_one_and_a_refused_resume_disturbs_nothing() {
+    let folder = Folder::new();
+    let mut long = scene();
+    // A million steps, as below.
+    long["time"] = json!({ "duration": 1000, "step": "0.05 min" });
+    long["output"] = json!({ "figure_times": [1], "axons": { "interval": 100 }, "tables": "both" });
+    folder.write("scene.json", &long.to_string());
+    let results = folder.0.join("out/scene");
+    let mut child = tropism(&folder.0, &["scene.json"]).stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
+    // The manifest is written just before the first step.
+    while !results.join("manifest.json").exists() {
+        assert!(!wait(&mut child, Duration::from_millis(5)), "it ended before it was stopped");
+    }
+    assert!(!wait(&mut child, Duration::from_millis(300)), "it ended before it was stopped");
+    let partial = results.join(".axons.parquet.partial");
+    assert!(partial.exists());
+    std::fs::write(results.join("checkpoint.bin"), b"none").unwrap();
+    let refused = tropism(&folder.0, &["resume", "out/scene"]).output().unwrap();
+    assert!(words(&refused).contains("another run writes into it"), "{}", words(&refused));
+    assert!(partial.exists(), "the run's own file is still there");
+    std::fs::remove_file(results.join("checkpoint.bin")).unwrap();
+    let twice = format!("kill -TERM {0}; kill -TERM {0}", child.id());
+    assert!(Command::new("sh").args(["-c", &twice]).status().unwrap().success());
+    let output = child.wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(143), "{}", words(&output));
+    assert!(demand_whole(&results) && results.join("summary.json").exists());
+}
+
+#[test]
 fn a_command_that_writes_at_its_end_says_that_it_was_stopped() {
     let folder = Folder::new();
     let mut command = Command::new(env!("CARGO_BIN_EXE_tropism"));

@@ -234,9 +234,9 @@ fn fields_whose_levels_do_not_fit_are_given_up_while_they_are_solved() {
         assert!(within(matrix + cue).is_ok(), "{transport}");
         // What stands at a moment is held beside the levels, and is less than half as much as two of these.
         let refused = within(matrix + 0.7 * cue).map(|_| ()).unwrap_err().to_string();
-        let words = "cue `read` (eq. 2, /cues/read): its first ";
+        let words = "cue `read` (eq. 2, /cues/read): levels of its field, ";
         assert!(
-            refused.starts_with(words) && refused.contains(" levels take more memory than is left, 0.00 GB"),
+            refused.starts_with(words) && refused.contains(" so far, take more than what is left, 0.000 GB"),
             "{refused}"
         );
     }

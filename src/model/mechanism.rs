@@ -76,6 +76,9 @@ pub enum InstallError {
     /// A solve failed.
     #[error("{0}")]
     Solve(String),
+    /// What is solved takes more memory than there is.
+    #[error("{0}")]
+    NoRoom(String),
 }
 
 /// What a mechanism's check may know of the scene.

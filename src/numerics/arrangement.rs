@@ -3,15 +3,15 @@
 //! Segments that cross get a common point there, segments that touch or overlap share their points, and points closer than
 //! a tolerance become one. All results depend on the order of the input alone.
 
-use crate::numerics::polygon::{bounding_box, cross, distance, minus, nearest_on_side};
+use crate::numerics::polygon::{NearestOnEdge, bounding_box, cross, distance, minus, nearest_on_side};
 use crate::numerics::side_tree::SideTree;
 use rstar::primitives::{GeomWithData, Line};
-use rstar::{AABB, PointDistance, RTree};
+use rstar::{AABB, RTree};
 
 type Segment = [[f64; 2]; 2];
 
 /// Points, and segments between them that meet nowhere but in their ends.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct Arrangement {
     /// Distinct points (µm).
     pub points: Vec<[f64; 2]>,
@@ -22,6 +22,11 @@ pub struct Arrangement {
 impl Arrangement {
     /// Cuts `segments` at all common points; points within `tolerance` (µm) are one.
     pub fn new(segments: &[Segment], tolerance: f64) -> Self {
+        Self::within(segments, tolerance, usize::MAX).unwrap_or_default()
+    }
+
+    /// The same, but none if there are more than so many points.
+    pub fn within(segments: &[Segment], tolerance: f64, most: usize) -> Option<Self> {
         let mut points = Merged::default();
         let ends: Vec<[u32; 2]> =
             segments.iter().map(|&[a, b]| [points.number(a, tolerance), points.number(b, tolerance)]).collect();
@@ -34,8 +39,11 @@ impl Arrangement {
                     pair.cut(&mut points, &mut cuts, tolerance);
                 }
             }
+            if points.points.len() > most {
+                return None;
+            }
         }
-        Self { points: points.points, segments: join(cuts) }
+        Some(Self { points: points.points, segments: join(cuts) })
     }
 
     /// The same segments, each divided evenly into pieces no longer than `size` (µm), and these halved while they are longer than
@@ -65,8 +73,9 @@ impl Arrangement {
         Self { points, segments }
     }
 
-    /// The point that lies nearest to a segment it is no end of, and how far away that is (µm); of several the first.
-    pub fn narrowest(&self) -> Option<([f64; 2], f64)> {
+    /// The place that is narrowest for its sides: where a point lies nearest to a segment that it is no end of, over the segment's length; of several the
+    /// first.
+    pub fn narrowest(&self) -> Option<Narrow> {
         let side = |segment: &[u32; 2]| segment.map(|end| self.points[end as usize]);
         let line = |segment: &[u32; 2]| {
             let [from, to] = side(segment);
@@ -75,9 +84,36 @@ impl Arrangement {
         let tree = RTree::bulk_load(self.segments.iter().map(line).collect());
         let room = |(place, point): (u32, &[f64; 2])| {
             let other = tree.nearest_neighbor_iter(*point).find(|segment| !segment.data.contains(&place))?;
-            Some((*point, other.distance_2(point).sqrt()))
+            let [from, to] = side(&other.data);
+            let NearestOnEdge { distance: away, point: opposite, .. } = nearest_on_side([from, to], *point);
+            let middle = [0, 1].map(|k| 0.5 * (point[k] + opposite[k]));
+            Some(Narrow { point: *point, middle, distance: away, length: distance(from, to) })
         };
-        (0..).zip(&self.points).filter_map(room).min_by(|a, b| a.1.total_cmp(&b.1))
+        (0..).zip(&self.points).filter_map(room).min_by(|a, b| a.share().total_cmp(&b.share()))
+    }
+}
+
+/// Where a segment passes a point.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Narrow {
+    /// The point (µm).
+    pub point: [f64; 2],
+    /// Half-way between it and the segment (µm).
+    pub middle: [f64; 2],
+    /// How far away the segment is (µm).
+    pub distance: f64,
+    /// Length of the segment (µm).
+    pub length: f64,
+}
+
+impl Narrow {
+    fn share(&self) -> f64 {
+        self.distance / self.length
+    }
+
+    /// Whether that is why a mesh has many vertices.
+    pub fn is_to_blame(&self) -> bool {
+        self.share() < 0.05
     }
 }
 
@@ -217,9 +253,14 @@ mod tests {
     fn the_narrowest_place_is_between_sides_that_share_no_point() {
         let comb =
             [[[0.0, 0.0], [9.0, 0.0]], [[9.0, 0.0], [9.0, 5.0]], [[4.0, 3.0], [4.0, 0.25]], [[0.0, 0.0], [0.1, 5.0]]];
-        let (point, distance) = Arrangement::new(&comb, 1e-9).narrowest().unwrap();
-        assert_eq!((point, distance), ([4.0, 0.25], 0.25));
-        assert_eq!(Arrangement::new(&comb[..2], 1e-9).narrowest().map(|(_, distance)| distance), Some(5.0));
+        let Narrow { point, middle, distance, length } = Arrangement::new(&comb, 1e-9).narrowest().unwrap();
+        assert_eq!((point, middle, distance, length), ([4.0, 0.25], [4.0, 0.125], 0.25, 9.0));
+        // A small shape has sides near to one another, but not for their length.
+        let small = [[[6.0, 2.0], [6.1, 2.0]], [[6.1, 2.0], [6.05, 2.1]], [[6.05, 2.1], [6.0, 2.0]]];
+        let with_small: Vec<_> = comb.into_iter().chain(small).collect();
+        assert_eq!(Arrangement::new(&with_small, 1e-9).narrowest().unwrap().point, [4.0, 0.25]);
+        assert_eq!(Arrangement::new(&comb[..2], 1e-9).narrowest().map(|narrow| narrow.distance), Some(5.0));
         assert_eq!(Arrangement::new(&comb[..1], 1e-9).narrowest(), None);
+        assert_eq!(Arrangement::within(&with_small, 1e-9, 6), None);
     }
 }

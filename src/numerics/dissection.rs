@@ -2,7 +2,9 @@
 //!
 //! Vertices are halved across the longer side of their box; those of one half that share a cell with the other half part the two
 //! and are eliminated last, and each half is ordered in the same way. On a mesh of `n` vertices of even density in the plane a
-//! factor then has `O(n log n)` entries and costs `O(n^{3/2})` operations, the least that is possible (George 1973).
+//! factor then has `O(n log n)` entries and costs `O(n^{3/2})` operations, the least that is possible (George 1973). Where vertices crowd
+//! along a line, as between sides that nearly touch, the longer side of the box may be across it, and half of them would part the others: a part that
+//! is too large for an even mesh gives way to a smaller one across another side.
 //!
 //! The order is then made a *postorder* of the elimination tree, in which the parent of column `j` is the first row below the
 //! diagonal of column `j` of the factor: a column comes straight before its parent wherever it can, so that columns of like
@@ -10,6 +12,8 @@
 
 /// Parts of at most so many vertices are left as they lie.
 const LEAF: usize = 12;
+/// Vertices between two halves of an even mesh over √n (n^{2/3} in space), at most: an equilateral one has about 1.1.
+const THICKEST: f64 = 4.0;
 /// No column: the parent of a root.
 const NONE: u32 = u32::MAX;
 
@@ -48,13 +52,14 @@ impl<const D: usize> Dissection<'_, D> {
             part.sort_unstable();
             return;
         }
-        let axis = self.longest_axis(part);
-        let place = |vertex: u32| self.coordinates[vertex as usize][axis];
-        let middle = part.len() / 2;
-        part.select_nth_unstable_by(middle, |&a, &b| place(a).total_cmp(&place(b)).then(a.cmp(&b)));
-        part[..middle].iter().for_each(|&vertex| self.side[vertex as usize] = Side::Low);
-        part[middle..].iter().for_each(|&vertex| self.side[vertex as usize] = Side::High);
-        let between = self.separator(&within);
+        let longest = self.longest_axis(part);
+        let mut between = self.halved(part, longest, &within);
+        if between.len() as f64 > THICKEST * (part.len() as f64).powf(1.0 - 1.0 / D as f64) {
+            let sizes = (0..D).map(|axis| self.halved(part, axis, &within).len());
+            let thinnest =
+                (0..D).zip(sizes).min_by_key(|(axis, size)| (*size, *axis)).map_or(longest, |(axis, _)| axis);
+            between = self.halved(part, thinnest, &within);
+        }
         between.iter().for_each(|&vertex| self.side[vertex as usize] = Side::Settled);
         let on = |half: Side| part.iter().copied().filter(|&vertex| self.side[vertex as usize] == half).collect();
         let (low, high): (Vec<u32>, Vec<u32>) = (on(Side::Low), on(Side::High));
@@ -76,6 +81,16 @@ impl<const D: usize> Dissection<'_, D> {
         low.iter().chain(&high).for_each(|&vertex| self.side[vertex as usize] = Side::Settled);
         self.split(first, cells_low);
         self.split(second, cells_high);
+    }
+
+    /// Halves a part across an axis, and returns what lies between the halves.
+    fn halved(&mut self, part: &mut [u32], axis: usize, within: &[u32]) -> Vec<u32> {
+        let place = |vertex: u32| self.coordinates[vertex as usize][axis];
+        let middle = part.len() / 2;
+        part.select_nth_unstable_by(middle, |&a, &b| place(a).total_cmp(&place(b)).then(a.cmp(&b)));
+        part[..middle].iter().for_each(|&vertex| self.side[vertex as usize] = Side::Low);
+        part[middle..].iter().for_each(|&vertex| self.side[vertex as usize] = Side::High);
+        self.separator(within)
     }
 
     fn corners(&self, cell: u32) -> &[u32] {
@@ -225,6 +240,25 @@ mod tests {
         for vertex in &order[231 - 11..] {
             assert!((mesh.vertices()[*vertex as usize][0] - 1.0).abs() < 0.11);
         }
+    }
+
+    #[test]
+    fn vertices_that_crowd_along_a_line_are_parted_across_it() {
+        // A thin strip, but for two corners that draw its box wide: the longer side of that is across the strip.
+        let mesh = structured_rectangle(1e-3, 1.0, 2, 200).unwrap();
+        let mut x = mesh.vertices().to_vec();
+        let last = x.len() - 1;
+        (x[0], x[last]) = ([-5.0, 0.0], [5.0, 1.0]);
+        let place = inverse(&nested_dissection(&x, mesh.cells(), 3));
+        let n = x.len() as u32;
+        // Three vertices lie abreast: once the last six are gone, the lower half has no part in the upper.
+        let halves = |low: u32| {
+            mesh.cells().chunks_exact(3).all(|cell| {
+                let places = || cell.iter().map(|&v| place[v as usize]).filter(|&p| p < n - 6);
+                places().all(|p| p < low) || places().all(|p| p >= low)
+            })
+        };
+        assert!((n / 2 - 8..=n / 2 + 8).any(halves));
     }
 
     #[test]

@@ -59,7 +59,7 @@ pub enum FieldPathError {
     },
     /// The levels of a field take more memory than there is for them.
     #[error(
-        "its first {levels} levels take more memory than is left, {gigabytes:.2} GB: a coarser `mesh_size` takes less"
+        "levels of its field, {levels} so far, take more than what is left, {gigabytes:.3} GB; a coarser `mesh_size` takes less"
     )]
     NoRoom {
         /// Levels held.

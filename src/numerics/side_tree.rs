@@ -60,6 +60,11 @@ impl SideTree {
         places
     }
 
+    /// A side by its place.
+    pub(crate) fn side(&self, place: usize) -> Side {
+        self.sides[place]
+    }
+
     /// Whether a point lies within a reach (µm) of a side.
     pub fn pass(&self, point: [f64; 2], reach: f64) -> bool {
         self.near(&[point, point], reach).into_iter().any(|i| distance_to_segment(point, self.sides[i]) <= reach)

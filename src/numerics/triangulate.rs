@@ -10,7 +10,7 @@
 
 use spade::{AngleLimit, ConstrainedDelaunayTriangulation, Point2, RefinementParameters, Triangulation};
 
-use crate::numerics::arrangement::Arrangement;
+use crate::numerics::arrangement::{Arrangement, Narrow};
 use crate::numerics::lattice::filling;
 use crate::numerics::mesh_grading::Grading;
 use crate::numerics::nearest_side::NearestSide;
@@ -82,10 +82,16 @@ pub enum TriangulationError {
         /// A point of it that is outside, or a point of a hole that it covers.
         point: [f64; 2],
     },
+    /// Outlines cross one another in too many places.
+    #[error("outlines have more than {limit} points, with those in which they cross one another")]
+    Crossings {
+        /// Most points allowed.
+        limit: usize,
+    },
     /// Sides come so near to one another that cells between them would be too many.
     #[error(
         "sides come within {distance:.1e} µm of one another at ({:.4}, {:.4}) µm: a mesh without small angles would need more than {limit} \
-         vertices there. Let them touch, move them apart, or ask for a smaller size",
+         vertices there. Move them apart (shapes may touch), or ask for a smaller size",
         point[0],
         point[1]
     )]
@@ -152,9 +158,10 @@ pub fn triangulate_graded(
 ) -> Result<FittedMesh, TriangulationError> {
     check_options(options)?;
     domain.check()?;
+    let ground = Ground::of(domain);
     for (index, outline) in outlines.iter().enumerate() {
         outline.check("the shape").map_err(|error| TriangulationError::Outline { outline: index, error })?;
-        check_inside(domain, index, outline)?;
+        check_inside((domain, &ground), index, outline)?;
     }
     let segments: Vec<_> = domain
         .rings()
@@ -165,7 +172,10 @@ pub fn triangulate_graded(
     if along > options.max_vertices as f64 {
         return Err(TriangulationError::TooManyVertices { limit: options.max_vertices, size: options.size });
     }
-    let constraints = Arrangement::new(&segments, merged(domain)).sampled(options.size, |point| grading.size_at(point));
+    let limit = CROSSINGS[0] + CROSSINGS[1] * segments.len();
+    let constraints = Arrangement::within(&segments, merged(domain), limit)
+        .ok_or(TriangulationError::Crossings { limit })?
+        .sampled(options.size, |point| grading.size_at(point));
     let (vertices, triangles) = refined_triangles(domain, (&constraints, outlines), options, grading)?;
     let (vertices, cells) = kept_and_renumbered(domain, &vertices, &triangles);
     let mut mesh = SimplexMesh::new(vertices, cells)?;
@@ -202,45 +212,63 @@ fn check_options(options: &MeshOptions) -> Result<(), TriangulationError> {
     Ok(())
 }
 
-/// Every point of an outline, and the middle of every piece into which the border cuts its sides, must be inside; and it
-/// may not cover a hole.
-fn check_inside(domain: &PlanarDomain, index: usize, outline: &Outline) -> Result<(), TriangulationError> {
-    let tolerance = 10.0 * merged(domain);
-    let border: Vec<_> = domain.rings().flat_map(|ring| sides(&ring.points)).collect();
-    let refused = |point| Err(TriangulationError::OutlineOutside { outline: index, point });
-    let on_border = |point| border.iter().any(|&side| nearest_on_side(side, point).distance <= tolerance);
-    let inside = |point| domain.contains(point) || on_border(point);
-    for [from, to] in sides(&outline.points) {
-        if !inside(from) {
-            return refused(from);
-        }
+/// Where outlines have to lie: sides and inside of a domain.
+struct Ground {
+    border: SideTree,
+    inside: Inside,
+    /// Distance (µm) within which a point counts as on the border.
+    tolerance: f64,
+}
+
+impl Ground {
+    fn of(domain: &PlanarDomain) -> Self {
+        let border = SideTree::of(domain.rings().flat_map(|ring| sides(&ring.points)).collect());
+        Self { border, inside: Inside::of(domain), tolerance: 10.0 * merged(domain) }
+    }
+
+    fn holds(&self, point: [f64; 2]) -> bool {
+        self.inside.contains(point) || self.border.pass(point, self.tolerance)
+    }
+
+    /// A point of a side that does not lie inside, if there is one: of its ends and of the middles of the pieces into which the border cuts it.
+    fn outside(&self, [from, to]: [[f64; 2]; 2]) -> Option<[f64; 2]> {
         let mut shares = vec![0.0, 1.0];
-        for &[a, b] in &border {
+        for [a, b] in self.border.near(&[from, to], self.tolerance).into_iter().map(|place| self.border.side(place)) {
             let divisor = cross(minus(to, from), minus(b, a));
             shares.push(cross(minus(a, from), minus(b, a)) / divisor);
         }
         shares.retain(|share| (0.0..=1.0).contains(share));
         shares.sort_by(f64::total_cmp);
-        for pair in shares.windows(2) {
-            let middle = 0.5 * (pair[0] + pair[1]);
-            let point = [from[0] + middle * (to[0] - from[0]), from[1] + middle * (to[1] - from[1])];
-            if !inside(point) {
-                return refused(point);
-            }
-        }
+        let at = |share: f64| [from[0] + share * (to[0] - from[0]), from[1] + share * (to[1] - from[1])];
+        let middles = shares.windows(2).map(|pair| at(0.5 * (pair[0] + pair[1])));
+        std::iter::once(from).chain(middles).find(|point| !self.holds(*point))
     }
-    let covered = |point: &&[f64; 2]| {
-        outline.contains(**point) && sides(&outline.points).all(|s| nearest_on_side(s, **point).distance > tolerance)
-    };
-    match domain.holes.iter().flat_map(|hole| &hole.points).find(covered) {
-        Some(&point) => refused(point),
+}
+
+/// Every point of an outline must be inside; and it may not cover a hole.
+fn check_inside(
+    (domain, ground): (&PlanarDomain, &Ground),
+    index: usize,
+    outline: &Outline,
+) -> Result<(), TriangulationError> {
+    let outline_sides = SideTree::of_ring(&outline.points);
+    let covered = |point: &&[f64; 2]| outline_sides.enclose(**point) && !outline_sides.pass(**point, ground.tolerance);
+    let outside = sides(&outline.points).find_map(|side| ground.outside(side));
+    match outside.or_else(|| domain.holes.iter().flat_map(|hole| &hole.points).find(covered).copied()) {
+        Some(point) => Err(TriangulationError::OutlineOutside { outline: index, point }),
         None => Ok(()),
     }
 }
 
 /// Vertices that may be added to mend angles: so many, and so many for each that size and shapes ask for. Elsewhere they are a few in a hundred;
 /// between sides that nearly touch they go with length over distance.
-const MENDING: [usize; 2] = [20_000, 2];
+const MENDING: [usize; 2] = [50_000, 4];
+
+/// Points that outlines may have with their crossings: so many, and so many for each side.
+const CROSSINGS: [usize; 2] = [20_000, 4];
+
+/// Squares of the size that the box around a domain may hold, over the vertices that are allowed: a slanted strip fills little of it.
+const EMPTY_BOX: f64 = 10.0;
 
 /// Distance (µm) within which points of a domain and its outlines are one.
 fn merged(domain: &PlanarDomain) -> f64 {
@@ -260,13 +288,15 @@ fn refined_triangles(
 ) -> Result<Soup, TriangulationError> {
     let too_many = TriangulationError::TooManyVertices { limit: options.max_vertices, size: options.size };
     let [low, high] = bounding_box(&domain.outer.points);
-    let expected = (high[0] - low[0]) * (high[1] - low[1]) / (options.size * options.size);
-    if expected + constraints.points.len() as f64 > options.max_vertices as f64 {
+    let (squares, most) = (|area: f64| area / (options.size * options.size), options.max_vertices as f64);
+    if squares(domain.area()) + constraints.points.len() as f64 > most
+        || squares((high[0] - low[0]) * (high[1] - low[1])) > EMPTY_BOX * most
+    {
         return Err(too_many);
     }
     let mut points = constraints.points.clone();
     points.extend(filling(domain, (constraints, outlines), options.size, grading));
-    points.extend(frame(domain));
+    points.extend(frame(domain, constraints));
     if points.len() > options.max_vertices {
         return Err(too_many);
     }
@@ -283,17 +313,24 @@ fn refined_triangles(
         cdt.add_constraint_and_split(handle(from), handle(to), |point| point);
     }
     let (room, limit) = (options.max_vertices - count, MENDING[0] + MENDING[1] * count);
-    let parameters = RefinementParameters::new()
-        .with_angle_limit(AngleLimit::from_rad(options.min_angle))
-        .with_max_additional_vertices(room.min(limit));
-    if !cdt.refine(parameters).refinement_complete {
-        let narrow = constraints.narrowest().filter(|_| limit <= room);
-        return Err(narrow.map_or(too_many, |(point, distance)| {
-            let through = |outline: &Outline| {
-                sides(&outline.points).any(|side| nearest_on_side(side, point).distance <= merged(domain))
-            };
-            TriangulationError::Narrow { outline: outlines.iter().position(through), point, distance, limit }
-        }));
+    let mut refined = |vertices: usize| {
+        let limited = RefinementParameters::new().with_angle_limit(AngleLimit::from_rad(options.min_angle));
+        cdt.refine(limited.with_max_additional_vertices(vertices)).refinement_complete
+    };
+    if !refined(room.min(limit)) {
+        let narrow = constraints.narrowest();
+        // Between folds of the border nothing is kept, but mended all the same.
+        let is_outside = narrow.is_some_and(|narrow| !domain.contains(narrow.middle));
+        if !(is_outside && limit < room && refined(room - limit)) {
+            let narrow = narrow.filter(|narrow| !is_outside && (limit < room || narrow.is_to_blame()));
+            return Err(narrow.map_or(too_many, |Narrow { point, distance, .. }| {
+                let through = |outline: &Outline| {
+                    sides(&outline.points).any(|side| nearest_on_side(side, point).distance <= merged(domain))
+                };
+                let (outline, limit) = (outlines.iter().position(through), limit.min(room));
+                TriangulationError::Narrow { outline, point, distance, limit }
+            }));
+        }
     }
     let vertices = cdt.vertices().map(|v| [v.position().x, v.position().y]).collect();
     let triangles = cdt.inner_faces().map(|face| face.vertices().map(|v| v.index() as u32)).collect();
@@ -302,10 +339,15 @@ fn refined_triangles(
 
 /// Corners of a box well outside the domain. Points on a slanted side lie on it only up to round-off, so that they and the convex hull
 /// would enclose triangles without a height, which no refinement mends; with a box around, the hull is the box's. Sides parallel
-/// to an axis are exact and need none.
-fn frame(domain: &PlanarDomain) -> Vec<[f64; 2]> {
+/// to an axis are exact and need none, unless an outline that touches one does so up to round-off and takes it along.
+fn frame(domain: &PlanarDomain, constraints: &Arrangement) -> Vec<[f64; 2]> {
     let slanted = |[a, b]: [[f64; 2]; 2]| a[0] != b[0] && a[1] != b[1];
-    if !domain.rings().flat_map(|ring| sides(&ring.points)).any(slanted) {
+    let border = || domain.rings().flat_map(|ring| sides(&ring.points));
+    let beside = |point: &[f64; 2]| {
+        let near = border().map(|side| nearest_on_side(side, *point).distance).fold(f64::INFINITY, f64::min);
+        near > 0.0 && near <= merged(domain)
+    };
+    if !border().any(slanted) && !constraints.points.iter().any(beside) {
         return Vec::new();
     }
     let [low, high] = domain.bounding_box();
@@ -595,17 +637,65 @@ mod tests {
         let meshed = |gap| triangulate(&domain, &beside(gap), &MeshOptions::of_size(15.0));
         let [apart, near, nearer] = [10.0, 0.02, 0.01].map(|gap| meshed(gap).unwrap().mesh.vertex_count() as f64);
         assert!(((nearer - apart) / (near - apart) - 2.0).abs() < 0.2, "{apart} {near} {nearer}");
-        let refused = meshed(1e-4).unwrap_err();
-        let TriangulationError::Narrow { outline: Some(0), point, distance, limit: 20_000.. } = refused else {
+        let refused = meshed(1e-5).unwrap_err();
+        let TriangulationError::Narrow { outline: Some(0), point, distance, limit: 50_000.. } = refused else {
             panic!("{refused}")
         };
-        assert!((distance - 1e-4).abs() < 1e-12 && point[0] == 60.0, "{point:?} {distance}");
+        assert!((distance - 1e-5).abs() < 1e-12 && point[0] == 60.0, "{point:?} {distance}");
         // The border has no index, and a size at which as many are wanted anyway is served.
-        let slit = Ring { points: vec![[40.0, 1e-4], [60.0, 1e-4], [60.0, 9.0], [40.0, 9.0]], edges: vec![0; 4] };
+        let slit = Ring { points: vec![[40.0, 1e-5], [60.0, 1e-5], [60.0, 9.0], [40.0, 9.0]], edges: vec![0; 4] };
         let slit = PlanarDomain::new(domain.outer.clone(), vec![slit], domain.edge_names.clone());
         let refused = triangulate(&slit, &[], &MeshOptions::of_size(15.0)).unwrap_err();
         assert!(matches!(refused, TriangulationError::Narrow { outline: None, .. }), "{refused}");
-        assert!(triangulate(&domain, &beside(1e-3), &MeshOptions::of_size(1.0)).is_ok());
+        assert!(triangulate(&domain, &beside(5e-4), &MeshOptions::of_size(1.0)).is_ok());
+    }
+
+    #[test]
+    fn an_outline_that_touches_the_border_up_to_round_off_needs_no_more_vertices_than_one_that_does_exactly() {
+        let domain = PlanarDomain::rectangle(100.0, 99.9);
+        let count = |top: f64| {
+            let outline = [Outline::rectangle([10.0, 40.0], [60.0, top])];
+            let fitted = triangulate(&domain, &outline, &MeshOptions::of_size(10.0)).unwrap();
+            assert!(
+                (total_area(&fitted) / 9990.0 - 1.0).abs() < 1e-9 && fitted.min_angle > 25f64.to_radians(),
+                "{top}"
+            );
+            fitted.mesh.vertex_count()
+        };
+        let exact = count(99.9);
+        for top in [3.0 * 33.3, 99.9 - 1e-12, 99.9 - 1e-9, 99.9 + 1e-12] {
+            assert!(count(top).abs_diff(exact) < 10, "{top}: {} for {exact}", count(top));
+        }
+    }
+
+    #[test]
+    fn a_border_may_have_folds_as_near_as_one_likes_since_nothing_is_kept_between() {
+        let fold = vec![
+            [0.0, 0.0],
+            [300.0, 0.0],
+            [300.0, 200.0],
+            [150.001, 200.0],
+            [150.0, 20.0],
+            [149.999, 200.0],
+            [0.0, 200.0],
+        ];
+        let edges = vec![0; fold.len()];
+        let domain = PlanarDomain::new(Ring { points: fold, edges }, Vec::new(), vec!["border".into()]);
+        let fitted = triangulate(&domain, &[], &MeshOptions::of_size(15.0)).unwrap();
+        assert!((total_area(&fitted) / domain.area() - 1.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn outlines_that_cross_in_too_many_places_are_refused_before_all_are_found() {
+        let domain = PlanarDomain::rectangle(400.0, 400.0);
+        let bars = |i: u32| {
+            let at = 10.0 + f64::from(i);
+            let upright = Outline::rectangle([at, 5.0], [at + 0.5, 395.0]);
+            [upright, Outline::rectangle([5.0, at], [395.0, at + 0.5])]
+        };
+        let outlines: Vec<Outline> = (0..200).flat_map(bars).collect();
+        let refused = triangulate(&domain, &outlines, &MeshOptions::of_size(20.0)).unwrap_err();
+        assert!(matches!(refused, TriangulationError::Crossings { limit: 20_000.. }), "{refused}");
     }
 
     #[test]

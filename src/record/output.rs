@@ -172,11 +172,33 @@ pub struct Claim {
     _folder: Option<fs::File>,
 }
 
-/// Makes a folder for results, claims it, and tries to write into it, so that a long run does not end in one that cannot be written.
+/// Claims a folder, if it is there.
 ///
 /// # Errors
-/// The path and the system's reason; a folder that another process, or another part of this one, has claimed.
+/// A folder that another process, or another part of this one, has claimed.
+pub fn claim(folder: &Path) -> Result<Claim, WriteError> {
+    let open = fs::File::open(folder).ok();
+    if open.as_ref().is_some_and(|open| matches!(open.try_lock(), Err(fs::TryLockError::WouldBlock))) {
+        let words = "another run writes into it; another --out is needed, or patience";
+        return Err(WriteError { path: folder.to_owned(), source: io::Error::new(io::ErrorKind::ResourceBusy, words) });
+    }
+    Ok(Claim { _folder: open })
+}
+
+/// Makes a folder for results and claims it.
+///
+/// # Errors
+/// As [`try_folder`] and [`claim`].
 pub fn prepare_folder(folder: &Path) -> Result<Claim, WriteError> {
+    try_folder(folder)?;
+    claim(folder)
+}
+
+/// Makes a folder for results, if it is not there, and tries to write into it, so that a long run does not end in one that cannot be written.
+///
+/// # Errors
+/// The path and the system's reason.
+pub fn try_folder(folder: &Path) -> Result<(), WriteError> {
     if folder.exists() && !folder.is_dir() {
         let source = io::Error::new(io::ErrorKind::NotADirectory, "it is a file, not a folder");
         return Err(WriteError { path: folder.to_owned(), source });
@@ -184,16 +206,7 @@ pub fn prepare_folder(folder: &Path) -> Result<Claim, WriteError> {
     // A name of its own: another run may try the same folder.
     let trial = folder.join(format!(".trial-{}", std::process::id()));
     write_atomically(&trial, b"")?;
-    fs::remove_file(&trial).map_err(|source| WriteError { path: trial, source })?;
-    let open = fs::File::open(folder).ok();
-    if open.as_ref().is_some_and(|open| matches!(open.try_lock(), Err(fs::TryLockError::WouldBlock))) {
-        let source = io::Error::new(
-            io::ErrorKind::ResourceBusy,
-            "another run writes into it; another --out is needed, or patience",
-        );
-        return Err(WriteError { path: folder.to_owned(), source });
-    }
-    Ok(Claim { _folder: open })
+    fs::remove_file(&trial).map_err(|source| WriteError { path: trial, source })
 }
 
 /// `folder/.name.partial` for `folder/name`.

@@ -39,6 +39,9 @@ pub enum AssemblyError {
     /// Something could not be solved.
     #[error("{0}")]
     Solve(String),
+    /// What is solved before the first step takes more memory than there is.
+    #[error("{0}")]
+    NoRoom(String),
 }
 
 impl AssemblyError {
@@ -245,6 +248,7 @@ impl Meshing<'_> {
             }
             TriangulationError::Outline { outline, error } => at_shape(outline, error.to_string()),
             TriangulationError::Narrow { outline: Some(outline), .. } => at_shape(outline, error.to_string()),
+            TriangulationError::Narrow { outline: None, .. } => AssemblyError::at("/tissue/outline", error.to_string()),
             TriangulationError::NotFitted { outline, area, wanted } => at_shape(
                 outline,
                 format!("is too small or too thin for this tissue: cells cover {area:e} um^2 of its {wanted:e} um^2"),
@@ -295,6 +299,7 @@ fn refused(name: &str, error: InstallError) -> AssemblyError {
     match error {
         InstallError::Scenario(violation) => AssemblyError::Scenario(vec![violation.under(&format!("/{name}"))]),
         InstallError::Solve(account) => AssemblyError::Solve(account),
+        InstallError::NoRoom(account) => AssemblyError::NoRoom(account),
     }
 }
 

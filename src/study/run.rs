@@ -78,6 +78,8 @@ pub struct Finished {
     pub recorder: Recorder,
     /// The film of the run, if the scene has frames and they were to be kept.
     pub recording: Option<Recording>,
+    /// The first of the files for other tools that could not be written, if there is one.
+    pub written: Result<(), RunError>,
 }
 
 /// What is kept of a run besides its summary and the snapshots of its figure.
@@ -167,7 +169,7 @@ pub enum Ended {
     Done,
     /// By a fault.
     Fault(Fault),
-    /// On the way, because it was stopped.
+    /// On the way, because it was stopped or a file for other tools could not be written.
     Stopped(Fault),
 }
 
@@ -252,8 +254,11 @@ impl Run {
             }
             if outputs.are_due(now) {
                 simulation.bring_tissue_here();
-                outputs.look(simulation.world())?;
+                let written = outputs.look(simulation.world());
                 simulation.lap("record");
+                if let Err(error) = written {
+                    return Ok(Ended::Stopped(Fault { time: simulation.time(), account: error.to_string() }));
+                }
             }
             if simulation.is_over() {
                 return Ok(Ended::Done);
@@ -275,7 +280,7 @@ impl Run {
     /// A file for other tools that could not be written.
     pub fn finish(mut self, loaded: &Loaded, ended: &Ended) -> Result<Finished, RunError> {
         self.simulation.bring_tissue_here();
-        let remarks = self.outputs.finish(self.simulation.world())?;
+        let (remarks, written) = self.outputs.finish(self.simulation.world());
         let world = self.simulation.world();
         let fault = match ended {
             Ended::Done => None,
@@ -299,7 +304,7 @@ impl Run {
         let recording = self.recorder.take_film().and_then(|film| film.develop(world, &title));
         let mut summary = Summary::of(world, &options, fault);
         summary.notes.extend(self.recorder.given_up.clone().into_iter().chain(remarks));
-        Ok(Finished { summary, recorder: self.recorder, recording })
+        Ok(Finished { summary, recorder: self.recorder, recording, written: written.map_err(RunError::from) })
     }
 }
 
@@ -315,6 +320,9 @@ fn run_error(error: AssemblyError, path: &Path) -> RunError {
     match error {
         AssemblyError::Scenario(problems) => RunError::Scenario(ScenarioErrors { path: path.to_owned(), problems }),
         AssemblyError::Solve(account) => RunError::Solve(account),
+        AssemblyError::NoRoom(account) => RunError::Arguments(format!(
+            "the scene does not fit into memory: {account}; `--memory any` solves it all the same"
+        )),
     }
 }
 
@@ -334,7 +342,7 @@ pub(super) fn recorder_options(loaded: &Loaded, keep: Records) -> RecorderOption
 ///
 /// # Errors
 /// The file that could not be written, or the picture that could not be drawn.
-pub fn write_results(folder: &Path, asked: Asked, finished: &Finished) -> Result<(), RunError> {
+pub fn write_results(folder: &Path, asked: Asked, finished: &mut Finished) -> Result<(), RunError> {
     let loaded = asked.loaded;
     let Recorder { trajectories, snapshots, .. } = &finished.recorder;
     let manifest = write_json(&folder.join("manifest.json"), &Manifest::of(loaded));
@@ -346,7 +354,8 @@ pub fn write_results(folder: &Path, asked: Asked, finished: &Finished) -> Result
         },
         || write_figure(folder, loaded, snapshots),
     );
-    let written = manifest.and(report).and(table.map_err(RunError::from)).and(figure);
+    let others = std::mem::replace(&mut finished.written, Ok(()));
+    let written = others.and(manifest).and(report).and(table.map_err(RunError::from)).and(figure);
     // Last, since it says whether the results are whole.
     let mut summary = Cow::Borrowed(&finished.summary);
     if let Err(error) = &written {

@@ -1,12 +1,16 @@
 //! Ctrl-C and the scheduler's signal: the first ends the run after its step, a second one ends the program at once.
 
 use super::voice::alarm;
+use crate::model::stopwatch::Elapsed;
 use signal_hook::consts::{SIGINT, SIGTERM};
 use signal_hook::flag;
 use signal_hook::iterator::Signals;
 use std::io;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+/// Signals that come within so long (s) are one: some senders send theirs to a process and again to its group.
+const ONE: f64 = 0.2;
 
 /// What has been caught so far.
 #[derive(Debug, Clone)]
@@ -28,13 +32,18 @@ impl Interrupt {
     /// The system's reason.
     pub fn catch() -> io::Result<Self> {
         let caught = Arc::new(AtomicUsize::new(0));
-        let again = Arc::new(AtomicBool::new(false));
         for signal in [SIGINT, SIGTERM] {
-            // In this order: the first signal finds `again` unset and sets it.
-            flag::register_conditional_shutdown(signal, 128 + signal, Arc::clone(&again))?;
-            flag::register(signal, Arc::clone(&again))?;
             flag::register_usize(signal, Arc::clone(&caught), signal as usize)?;
         }
+        let mut signals = Signals::new([SIGINT, SIGTERM])?;
+        std::thread::spawn(move || {
+            let mut first: Option<Elapsed> = None;
+            for number in signals.forever() {
+                if first.get_or_insert_default().seconds() > ONE {
+                    std::process::exit(128 + number);
+                }
+            }
+        });
         Ok(Self(caught))
     }
 

@@ -7,7 +7,7 @@ use crate::model::mechanism::Roster;
 use crate::model::quantity::{Quantity, Time};
 use crate::record::checkpoint;
 use crate::record::earlier;
-use crate::record::output::prepare_folder;
+use crate::record::output::{claim, try_folder};
 use crate::study::plan::memory_of;
 use crate::study::report::Asked;
 use crate::study::resume::{Checkpoints, Found, Resumed, pick_up};
@@ -52,6 +52,8 @@ pub fn run_once(
 /// # Errors
 /// A folder without a checkpoint that can be used; a run that does not fit into `room`; a file that cannot be written.
 pub fn resume((folder, room): (&Path, Room), roster: &Roster, interval: Option<f64>) -> Result<ExitCode, RunError> {
+    // Before anything there is looked at: a run that writes there must not be disturbed.
+    let _claim = claim(folder)?;
     let Resumed { loaded, path, command, run, interval: own, refused } = match pick_up(folder, roster)? {
         Found::Stopped(resumed) => *resumed,
         Found::Finished => {
@@ -61,7 +63,7 @@ pub fn resume((folder, room): (&Path, Room), roster: &Roster, interval: Option<f
     };
     refused.iter().for_each(|reason| alarm!("warning: {reason}; the one before it is used"));
     room.admit(&loaded.scene.name, &memory_of(&run.simulation, &loaded, Records::ALL)?, 1)?;
-    let _claim = prepare_folder(folder)?;
+    try_folder(folder)?;
     note!("{}: resumed at t = {} h", loaded.scene.name, run.simulation.time());
     let asked = Asked { loaded: &loaded, command: &command };
     let checkpoints = Checkpoints::new(folder, interval.or(own), (asked, &path));
@@ -93,7 +95,7 @@ fn watch(mut run: Run, asked: Asked, mut checkpoints: Checkpoints) -> Result<Exi
     })?;
     bar.finish_and_clear();
     let is_stopped = matches!(ended, Ended::Stopped(_));
-    let finished = run.finish(asked.loaded, &ended)?;
+    let mut finished = run.finish(asked.loaded, &ended)?;
     let summary = &finished.summary;
     tell!("{}: t = {} h; {}", summary.scene, (summary.time * 1e6).round() / 1e6, summary.counts);
     if let Some(fraction) = summary.morphology.hits.fraction {
@@ -106,12 +108,13 @@ fn watch(mut run: Run, asked: Asked, mut checkpoints: Checkpoints) -> Result<Exi
     if let Some(fault) = &summary.fault {
         alarm!("{} the run ended {fault}", alarming("error:"));
     }
-    write_results(checkpoints.folder, asked, &finished)?;
+    let complete = summary.complete;
+    write_results(checkpoints.folder, asked, &mut finished)?;
     if !is_stopped {
         checkpoint::remove(checkpoints.folder)?;
     }
     tell!("results in {}", checkpoints.folder.display());
-    let code = signal.filter(|_| is_stopped).map_or(u8::from(!summary.complete), |signal| signal.code);
+    let code = signal.filter(|_| is_stopped).map_or(u8::from(!complete), |signal| signal.code);
     Ok(ExitCode::from(code))
 }
 

@@ -167,7 +167,7 @@ fn no_file_of_a_degenerate_scene_holds_what_is_no_number() {
     for case in cases {
         let name = case.name;
         let loaded = read_document(name, case.scene, &roster).unwrap();
-        let finished = simulate(&loaded, &roster, name.as_ref(), Records::ALL, |_| {}).unwrap();
+        let mut finished = simulate(&loaded, &roster, name.as_ref(), Records::ALL, |_| {}).unwrap();
         let summary = serde_json::to_value(&finished.summary).unwrap();
         let mut lost = Vec::new();
         lost_numbers(&summary, benign.get_or_insert_with(|| summary.clone()), "", &mut lost);
@@ -175,7 +175,7 @@ fn no_file_of_a_degenerate_scene_holds_what_is_no_number() {
         let mut files = vec![summary.to_string(), finished.recorder.trajectories.as_str().to_owned()];
         if ["speed_zero", "unstable_euler", "endless_step_slide", "flat"].contains(&name) {
             let folder = folder.0.join(name);
-            write_results(&folder, Asked { loaded: &loaded, command: "" }, &finished).unwrap();
+            write_results(&folder, Asked { loaded: &loaded, command: "" }, &mut finished).unwrap();
             let read = |file| std::fs::read_to_string(folder.join(file)).unwrap();
             files.extend(["summary.json", "trajectories.csv", "figure.svg", "manifest.json"].map(read));
         }

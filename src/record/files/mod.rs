@@ -205,20 +205,24 @@ impl Outputs {
         Ok(())
     }
 
-    /// Lets those that have not seen the end look at it, ends all files, and gives what the user should know of them.
-    ///
-    /// # Errors
-    /// What could not be written.
-    pub fn finish(self, world: &World) -> Result<Vec<String>, OutputError> {
+    /// Lets those that have not seen the end look at it, ends all files, and gives what the user should know of them, and the first error: the others
+    /// are ended all the same.
+    pub fn finish(self, world: &World) -> (Vec<String>, Result<(), OutputError>) {
         let now = world.resource::<Clock>().now;
-        let mut notes = Vec::new();
-        for mut timed in self.0 {
+        let ended = |mut timed: Timed| {
             if timed.with_end && timed.seen != Some(now) {
                 timed.look(world, now)?;
             }
-            notes.extend(timed.output.finish()?);
+            timed.output.finish()
+        };
+        let (mut notes, mut all) = (Vec::new(), Ok(()));
+        for found in self.0.into_iter().map(ended) {
+            match found {
+                Ok(said) => notes.extend(said),
+                Err(error) => all = all.and(Err(error)),
+            }
         }
-        Ok(notes)
+        (notes, all)
     }
 }
 
@@ -266,8 +270,37 @@ mod tests {
                 outputs.look(&world).unwrap();
             }
         }
-        outputs.finish(&world).unwrap();
+        outputs.finish(&world).1.unwrap();
         seen.lock().unwrap().clone()
+    }
+
+    /// An output on a disk that is full.
+    struct Full;
+
+    impl Output for Full {
+        fn look(&mut self, _: &World) -> Result<(), OutputError> {
+            Err(OutputError::Write(WriteError { path: "full".into(), source: std::io::ErrorKind::StorageFull.into() }))
+        }
+
+        fn keep(&self, _: &mut Vec<u8>) -> Result<(), WriteError> {
+            Ok(())
+        }
+
+        fn restore(&mut self, _: &mut KeptBytes) -> Result<(), OutputError> {
+            Ok(())
+        }
+    }
+
+    #[test]
+    fn what_cannot_be_written_does_not_keep_the_others_from_their_end() {
+        let seen = Arc::new(Mutex::new(Vec::new()));
+        let both: [Box<dyn Output>; 2] = [Box::new(Full), Box::new(Spy(seen.clone()))];
+        let timed = |output| Timed { interval: None, next: u64::MAX, with_end: true, seen: None, output };
+        let mut world = World::new();
+        world.insert_resource(Clock::new(TimeGrid::new(1.0).unwrap(), 10));
+        let (_, written) = Outputs(both.into_iter().map(timed).collect()).finish(&world);
+        assert!(written.unwrap_err().to_string().contains("full"));
+        assert_eq!(*seen.lock().unwrap(), [0]);
     }
 
     #[test]

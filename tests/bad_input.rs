@@ -74,7 +74,7 @@ fn refusal(set: &[&str]) -> Option<String> {
     };
     match Simulation::assemble(&loaded, &roster).err()? {
         AssemblyError::Scenario(problems) => Some(problems.iter().map(|problem| format!("{problem}\n")).collect()),
-        AssemblyError::Solve(account) => Some(format!("{account}\n")),
+        AssemblyError::Solve(account) | AssemblyError::NoRoom(account) => Some(format!("{account}\n")),
     }
 }
 

@@ -184,7 +184,7 @@ fn outcome(scene: Value, number: u64) -> (&'static str, String) {
             assert!(!problems.is_empty(), "scene {number} is refused without a problem");
             return ("refused in assembly", problems[0].pointer.clone());
         }
-        Err(AssemblyError::Solve(account)) => {
+        Err(AssemblyError::Solve(account) | AssemblyError::NoRoom(account)) => {
             assert!(!account.is_empty(), "scene {number} cannot be solved, for no reason");
             return ("not solved", String::new());
         }

@@ -341,14 +341,18 @@ fn refined_triangles(
 /// would enclose triangles without a height, which no refinement mends; with a box around, the hull is the box's. Sides parallel
 /// to an axis are exact and need none, unless an outline that touches one does so up to round-off and takes it along.
 fn frame(domain: &PlanarDomain, constraints: &Arrangement) -> Vec<[f64; 2]> {
-    let slanted = |[a, b]: [[f64; 2]; 2]| a[0] != b[0] && a[1] != b[1];
-    let border = || domain.rings().flat_map(|ring| sides(&ring.points));
-    let beside = |point: &[f64; 2]| {
-        let near = border().map(|side| nearest_on_side(side, *point).distance).fold(f64::INFINITY, f64::min);
-        near > 0.0 && near <= merged(domain)
-    };
-    if !border().any(slanted) && !constraints.points.iter().any(beside) {
-        return Vec::new();
+    let slanted = |[a, b]: &[[f64; 2]; 2]| a[0] != b[0] && a[1] != b[1];
+    let border: Vec<_> = domain.rings().flat_map(|ring| sides(&ring.points)).collect();
+    if !border.iter().any(slanted) {
+        let tree = SideTree::of(border);
+        let beside = |point: &[f64; 2]| {
+            let near = tree.near(&[*point; 2], merged(domain)).into_iter().map(|place| tree.side(place));
+            let nearest = near.map(|side| nearest_on_side(side, *point).distance).fold(f64::INFINITY, f64::min);
+            nearest > 0.0 && nearest <= merged(domain)
+        };
+        if !constraints.points.iter().any(beside) {
+            return Vec::new();
+        }
     }
     let [low, high] = domain.bounding_box();
     let room = 0.5 * domain.diameter();

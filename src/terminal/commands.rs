@@ -33,7 +33,12 @@ use std::process::ExitCode;
 /// # Errors
 /// Why there are no results, or not all of them.
 pub fn run_plan(scene: &SceneArguments, json: bool, roster: &Roster) -> Result<ExitCode, RunError> {
-    let mut found = plan(&scene.load(roster)?, roster, &scene.path())?;
+    let mut loaded = scene.load(roster)?;
+    if scene.memory != Room::Any {
+        // What `--memory` would refuse is told; only what is not there stops the plan itself.
+        loaded.room = Room::Free.beside(&loaded.scene);
+    }
+    let mut found = plan(&loaded, roster, &scene.path())?;
     found.pace = yardstick::pace();
     let admitted = scene.memory.admit(&found.scene, &found.memory_mb, 1);
     found.notes.extend(admitted.err().map(|refusal| refusal.to_string()));

@@ -1,5 +1,6 @@
 //! Plane geometry of closed polygons, given by their corners (µm); the last is joined to the first.
 
+pub(crate) use super::side_tree::Inside;
 pub use super::side_tree::SideTree;
 
 /// Relative length (of the bounding box's diagonal) under which two points count as one.

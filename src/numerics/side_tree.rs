@@ -2,7 +2,7 @@
 //!
 //! What is found is what looking at all finds, to the last bit: the tree only leaves out sides of which boxes tell that they do not matter.
 
-use super::planar_domain::PlanarDomain;
+use super::planar_domain::{PlanarDomain, Ring};
 use super::polygon::{MERGE_TOLERANCE, bounding_box, crosses_ray, distance, distance_to_segment, sides, sides_touch};
 use rstar::primitives::{GeomWithData, Line};
 use rstar::{AABB, RTree};
@@ -105,13 +105,24 @@ pub(crate) struct Inside {
 impl Inside {
     /// Of a domain.
     pub(crate) fn of(domain: &PlanarDomain) -> Self {
-        let holes = domain.holes.iter().map(|hole| SideTree::of_ring(&hole.points)).collect();
-        Self { outer: SideTree::of_ring(&domain.outer.points), holes }
+        let tree = |ring: &Ring| SideTree::of_ring(&ring.points);
+        Self::within(tree(&domain.outer), domain.holes.iter().map(tree).collect())
+    }
+
+    /// Between a ring and holes.
+    pub(crate) fn within(outer: SideTree, holes: Vec<SideTree>) -> Self {
+        Self { outer, holes }
     }
 
     /// Whether a point lies inside the outer ring and in no hole.
     pub(crate) fn contains(&self, point: [f64; 2]) -> bool {
         self.is_in_outer_ring(point) && !self.holes.iter().any(|hole| hole.enclose(point))
+    }
+
+    /// Whether a point lies inside, or within a reach (µm) of the border.
+    pub(crate) fn holds(&self, point: [f64; 2], reach: f64) -> bool {
+        let in_hole = |hole: &SideTree| hole.enclose(point) && !hole.pass(point, reach);
+        (self.outer.enclose(point) || self.outer.pass(point, reach)) && !self.holes.iter().any(in_hole)
     }
 
     /// Whether a point lies inside the outer ring.
@@ -123,7 +134,6 @@ impl Inside {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::numerics::planar_domain::Ring;
     use crate::numerics::polygon::ring_contains;
 
     /// A star of many points, whose sides lie close to one another and across each other's boxes.

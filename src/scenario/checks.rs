@@ -8,7 +8,7 @@ use super::suggest::advice;
 use crate::model::quantity::{Time, format_number};
 use crate::model::shape::{Shape, check_ring, coordinates};
 use crate::model::violation::{Violations, pointer_token};
-use crate::numerics::polygon::SideTree;
+use crate::numerics::polygon::{Inside, SideTree};
 
 /// A run of more steps than this would not end.
 const MOST_STEPS: f64 = 1e9;
@@ -80,12 +80,11 @@ fn check_tissue(tissue: &Tissue, violations: &mut Violations) {
     if let Outline::Polygon { outer, holes, vertices } = &tissue.outline {
         let mut found = Violations::new();
         check_named_ring(outer, "/tissue/outline/polygon/outer", &mut found);
-        let border = SideTree::of_ring(&outer.coordinates());
+        let border = Inside::within(SideTree::of_ring(&outer.coordinates()), Vec::new());
         for (index, hole) in holes.iter().enumerate() {
             let pointer = format!("/tissue/outline/polygon/holes/{index}");
             check_named_ring(hole, &pointer, &mut found);
-            let outside =
-                hole.coordinates().iter().position(|&point| !(border.enclose(point) || touches(&border, point)));
+            let outside = hole.coordinates().iter().position(|&point| !border.holds(point, round_off(point)));
             if let Some(point) = outside {
                 found.push(format!("{pointer}/points/{point}"), "the hole reaches out of the outer border");
             }
@@ -128,11 +127,13 @@ fn check_origin(population: &Population, outline: &Outline, pointer: &str, viola
         }
         Origin::Tissue => demand_direction(population, "the inside of a tissue has", pointer, violations),
         Origin::Points(points) => {
-            let inside = Inside::of(outline);
+            let inside = inside_of(outline);
             for (index, point) in coordinates(points).into_iter().enumerate() {
-                violations.demand(inside.holds(point), &format!("{pointer}/origin/points/{index}"), || {
-                    format!("[{}, {}] lies outside the tissue", format_number(point[0]), format_number(point[1]))
-                });
+                violations.demand(
+                    inside.holds(point, round_off(point)),
+                    &format!("{pointer}/origin/points/{index}"),
+                    || format!("[{}, {}] lies outside the tissue", format_number(point[0]), format_number(point[1])),
+                );
             }
             demand_direction(population, "points have", pointer, violations);
         }
@@ -171,28 +172,15 @@ pub(super) fn check_region(
     violations.demand(inside, place.0, || format!("{} lies outside the tissue, or partly so", place.1));
 }
 
-/// The inside of a tissue, its border included.
-struct Inside {
-    outer: SideTree,
-    holes: Vec<SideTree>,
+/// The inside of a tissue.
+fn inside_of(outline: &Outline) -> Inside {
+    let tree = |ring: &Ring| SideTree::of_ring(&ring.coordinates());
+    Inside::within(tree(&outline.outer()), outline.holes().iter().map(tree).collect())
 }
 
-impl Inside {
-    fn of(outline: &Outline) -> Self {
-        let tree = |ring: &Ring| SideTree::of_ring(&ring.coordinates());
-        Self { outer: tree(&outline.outer()), holes: outline.holes().iter().map(tree).collect() }
-    }
-
-    /// Whether a point lies inside, to round-off.
-    fn holds(&self, point: [f64; 2]) -> bool {
-        let in_hole = |hole: &SideTree| hole.enclose(point) && !touches(hole, point);
-        (self.outer.enclose(point) || touches(&self.outer, point)) && !self.holes.iter().any(in_hole)
-    }
-}
-
-/// Whether a point lies on a ring, to round-off.
-fn touches(ring: &SideTree, point: [f64; 2]) -> bool {
-    ring.pass(point, 1e-12 * (1.0 + point[0].abs() + point[1].abs()))
+/// How far (µm) from a point its round-off may lead.
+fn round_off(point: [f64; 2]) -> f64 {
+    1e-12 * (1.0 + point[0].abs() + point[1].abs())
 }
 
 /// Points of a disc's rim that are looked at.
@@ -200,13 +188,14 @@ const RIM: usize = 64;
 
 /// Whether a region lies inside the tissue, judged by the corners of a polygon and by points on the rim of a disc.
 fn lies_inside(region: &Shape, outline: &Outline) -> bool {
-    let inside = Inside::of(outline);
+    let inside = inside_of(outline);
     match region {
         Shape::Disc { centre, radius } => (0..RIM).all(|i| {
             let angle = std::f64::consts::TAU * i as f64 / RIM as f64;
             let reach = radius.0 * (1.0 - 1e-9);
-            inside.holds([centre[0].0 + reach * angle.cos(), centre[1].0 + reach * angle.sin()])
+            let point = [centre[0].0 + reach * angle.cos(), centre[1].0 + reach * angle.sin()];
+            inside.holds(point, round_off(point))
         }),
-        Shape::Polygon { points } => coordinates(points).iter().all(|&point| inside.holds(point)),
+        Shape::Polygon { points } => coordinates(points).iter().all(|&point| inside.holds(point, round_off(point))),
     }
 }

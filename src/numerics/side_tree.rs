@@ -146,6 +146,17 @@ mod tests {
     }
 
     #[test]
+    fn a_border_is_held_up_to_the_reach_and_the_inside_of_a_hole_is_not() {
+        let square = |low: f64, high: f64| SideTree::of_ring(&[[low, low], [high, low], [high, high], [low, high]]);
+        let inside = Inside::within(square(0.0, 9.0), vec![square(3.0, 6.0)]);
+        for (x, held) in
+            [(-0.2, false), (-0.05, true), (1.0, true), (3.05, true), (3.2, false), (5.95, true), (9.05, true)]
+        {
+            assert_eq!(inside.holds([x, 4.5], 0.1), held, "{x}");
+        }
+    }
+
+    #[test]
     fn what_is_inside_and_what_is_near_is_what_looking_at_all_sides_finds() {
         let (outer, hole) = (star(300, 0.1), star(100, 0.4).iter().map(|x| x.map(|x| 0.3 * x)).collect::<Vec<_>>());
         let ring = |points: &[[f64; 2]]| Ring { edges: vec![0; points.len()], points: points.to_vec() };

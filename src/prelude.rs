@@ -15,7 +15,7 @@ pub use serde::{Deserialize, Serialize};
 pub use crate::model::brownian::{BrownianTree, HeadingPaths};
 pub use crate::model::clock::{Clock, Kinks, StageTime};
 pub use crate::model::components::{
-    Axon, GrowthCone, Journey, Position, ReceptorWeights, Site, SpringState, Status, Velocity,
+    GrowthCone, Journey, Position, ReceptorWeights, Site, Spring, SpringState, Status, Velocity,
 };
 pub use crate::model::cones::{Cone, Cones, ConesWith};
 pub use crate::model::configuration::Configuration;

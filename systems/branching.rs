@@ -86,8 +86,9 @@ impl Mechanism for Branching {
         if let Some(cue) = &self.cue {
             CueFields::demand(model, cue);
         }
+        let grid = model.world.resource::<Clock>().grid;
         model.attach(move |cone: &GrowthCone| Budding {
-            next: cone.birth_time + waiting_time(seed, stream, (cone.axon, 0), rate),
+            next: cone.birth_time(&grid) + waiting_time(seed, stream, (cone.axon, 0), rate),
             count: 0,
         });
         model.keep_of_cones::<Budding>();

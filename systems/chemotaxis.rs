@@ -11,6 +11,7 @@ use crate::model::observables::{Effect as Seen, Observables};
 use crate::numerics::piecewise::value_and_slope;
 use crate::prelude::*;
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 /// How strong the pull of a gradient is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -147,7 +148,7 @@ impl Mechanism for Chemotaxis {
         }
         let names: Vec<String> =
             model.world.resource::<Populations>().0.iter().map(|population| population.name.clone()).collect();
-        let initial: Vec<Box<[f64]>> = names.iter().map(|name| self.initial_weights(name)).collect();
+        let initial: Vec<Arc<[f64]>> = names.iter().map(|name| self.initial_weights(name)).collect();
         model.attach(move |cone| ReceptorWeights(initial[cone.population as usize].clone()));
         let changing = self.receptors.values().any(|r| r.availability.is_some() || !r.silenced_by.is_empty());
         if changing {
@@ -164,7 +165,7 @@ impl Mechanism for Chemotaxis {
 }
 
 impl Chemotaxis {
-    fn initial_weights(&self, population: &String) -> Box<[f64]> {
+    fn initial_weights(&self, population: &String) -> Arc<[f64]> {
         let weight = |r: &Receptor| {
             if r.populations.is_empty() || r.populations.contains(population) { r.weight.0 } else { 0.0 }
         };
@@ -235,18 +236,22 @@ fn bind_receptors(world: &mut World) -> Result<(), InstallError> {
 fn weigh(
     receptors: Res<Receptors>,
     populations: Res<Populations>,
-    (tissue, fields, stage): (Res<Tissue>, Res<CueFields>, Res<StageTime>),
+    (tissue, fields): (Res<Tissue>, Res<CueFields>),
+    (clock, stage): (Res<Clock>, Res<StageTime>),
     mut cones: ConesWith<ReceptorWeights>,
 ) {
     cones.for_each(|cone, _, weights| {
         let population = &populations.0[cone.identity.population as usize].name;
-        for (weight, bound) in weights.0.iter_mut().zip(&receptors.0) {
+        for (weight, bound) in Arc::make_mut(&mut weights.0).iter_mut().zip(&receptors.0) {
             let receptor = &bound.receptor;
             if !receptor.populations.is_empty() && !receptor.populations.contains(population) {
                 continue;
             }
             let available = receptor.availability.as_ref().map_or(1.0, |availability| {
-                let born = if availability.clock == ClockOf::Age { cone.identity.birth_time } else { 0.0 };
+                let born = match availability.clock {
+                    ClockOf::Age => cone.identity.birth_time(&clock.grid),
+                    ClockOf::Scene => 0.0,
+                };
                 availability.at(stage.0 - born)
             });
             let unsilenced: f64 = bound

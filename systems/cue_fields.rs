@@ -175,7 +175,7 @@ impl CueFields {
 
     #[inline]
     fn sample_from(&self, mesh: &SimplexMesh<2>, index: usize, value: impl Fn(usize) -> f64, site: Site) -> CueSample {
-        let [second, third, _] = site.weights;
+        let [second, third] = site.weights;
         let place = (site.cell as usize, [1.0 - second - third, second, third]);
         let (c, gradient) = self.solved.fields[index].layout.sample(mesh, value, place);
         CueSample { concentration: c.max(0.0), gradient: Vector3::new(gradient[0], gradient[1], 0.0) }

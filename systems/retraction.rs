@@ -143,7 +143,7 @@ fn retract(
             }
             _ => 0.0,
         };
-        let age = now - cone.identity.birth_time;
+        let age = now - cone.identity.birth_time(&remodelling.clock.grid);
         if cone.status == Status::Retracting {
             retreat[i].left = draw_back(&mut remodelling, cone, (retreat[i].left, step));
         } else if let Course::Back(by) = course(&law, cone.status, age, concentration)

@@ -18,7 +18,6 @@ mod squares;
 pub use asking::Asking;
 
 use super::matrix::Loading;
-use crate::model::births::Origin;
 use crate::model::shafts::{BLOCK, Struck};
 use crate::numerics::locate::MaterialPoint;
 use crate::numerics::polylines::{Part, meeting};
@@ -140,7 +139,7 @@ impl ShaftIndex {
         scene: &ShaftScene,
         cones: &mut Cones,
         act: impl Fn(&mut S, &Asking, &Segments<2>) -> T + Sync,
-        write: impl Fn(&mut SpringState, T),
+        write: impl Fn(&mut Spring, T),
     ) -> usize {
         let side = self.side();
         let mut order = cones.collect(|cone, _| {
@@ -335,11 +334,11 @@ const BUNDLING: (f64, f64) = (4.2, 3.0);
 /// over the longer side of the box of all births, widened by the reach, times its shorter side and the way of one axon; and more where many
 /// grow abreast, which gather in bundles.
 fn evenly_spread(world: &mut World, reach: f64) -> f64 {
-    let mut origins = world.query::<&Origin>();
+    let mut origins = world.query_filtered::<&Site, With<GrowthCone>>();
     let tissue = world.resource::<Tissue>();
     let (mut low, mut high) = (Vector3::repeat(f64::INFINITY), Vector3::repeat(f64::NEG_INFINITY));
     for origin in origins.iter(world) {
-        let at = tissue.reference_position(origin.site);
+        let at = tissue.reference_position(*origin);
         (low, high) = (low.inf(&at), high.sup(&at));
     }
     let shafts = world.resource::<Shafts>();

@@ -5,6 +5,7 @@ mod common;
 use common::{cones, ended, hash_of_states, loaded, observed, to_end, try_load};
 use serde_json::{Value, json};
 use tropism::model::health::Counters;
+use tropism::prelude::{GrowthCone, Site, With};
 use tropism::scenario::load::Loaded;
 use tropism::simulation::Simulation;
 use tropism::systems;
@@ -106,10 +107,10 @@ fn births_are_the_same_draws_whatever_is_left_out() {
         let loaded = try_load(&every_mechanism(), &roster, left_out, &[]).unwrap();
         let simulation = Simulation::assemble(&loaded, &roster).unwrap();
         let world = simulation.world();
-        let mut origins = world.try_query::<&tropism::model::births::Origin>().unwrap();
+        let mut origins = world.try_query_filtered::<&Site, With<GrowthCone>>().unwrap();
         let tissue = world.resource::<tropism::prelude::Tissue>();
         // The mesh is fitted to the sources that are left, so a place is compared in space and not by its cell.
-        let places: Vec<_> = origins.iter(world).map(|origin| tissue.reference_position(origin.site)).collect();
+        let places: Vec<_> = origins.iter(world).map(|origin| tissue.reference_position(*origin)).collect();
         // Cones that wait for branches have no birth, and stand after all others.
         let times: Vec<_> = cones(world).iter().map(|cone| cone.identity.birth).filter(|&b| b != u64::MAX).collect();
         (times.clone(), places[..times.len()].to_vec())

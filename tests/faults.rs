@@ -59,7 +59,7 @@ fn spoil_pull(since: Res<Since>, stage: Res<StageTime>, mut cones: Cones) {
 
 fn spoil_site(since: Res<Since>, clock: Res<Clock>, mut cones: Query<&mut Site, With<GrowthCone>>) {
     if clock.hours() > since.0 {
-        cones.iter_mut().take(1).for_each(|mut site| site.weights = [f64::NAN; 3]);
+        cones.iter_mut().take(1).for_each(|mut site| site.weights = [f64::NAN; 2]);
     }
 }
 

@@ -185,7 +185,7 @@ impl Cover<'_> {
             each_growing(world, self.cones, self.starts, span, |step, mover| {
                 finish(step, mover, pair);
                 // A cone that was lost goes no further.
-                mover.start.stages().reached = if mover.start.fault.is_some() { u64::MAX } else { to };
+                mover.start.stages().reached = if mover.start.fault().is_some() { u64::MAX } else { to };
             });
         }
         if self.left.is_some() && self.take_back(world, is_due) > 0 {
@@ -215,7 +215,8 @@ impl Cover<'_> {
         for ((cone, status, mut site, _, _, mut spring, _), start) in self.cones.iter_mut(world).zip(&mut *self.starts)
         {
             if status.grows() && wanted(cone, start.stages()) {
-                (*site, *spring) = start.taken_back();
+                let (place, state) = start.taken_back();
+                (*site, *spring) = (place, state.into());
                 count += 1;
             }
         }

@@ -1,68 +1,68 @@
 //! Births: each axon starts at its own instant, at its own place on the border, heading into the tissue.
 
 use super::clock::Clock;
-use super::components::{GrowthCone, Journey, Position, Site, SpringState, Status, Velocity};
+use super::components::{GrowthCone, Journey, Position, Site, Spring, SpringState, Status, Velocity};
 use super::configuration::Configuration;
 use super::shafts::Shafts;
 use super::tissue::Tissue;
 use crate::kept;
 use crate::numerics::coordinates::AtVertices;
-use crate::numerics::simplex_mesh::BorderFacet;
-use bevy_ecs::prelude::{Component, Query, Res, ResMut, Resource, With};
+use bevy_ecs::prelude::{Query, Res, ResMut, Resource, With};
 use nalgebra::Vector3;
 
-/// Where a growth cone starts, and which way.
-#[derive(Debug, Clone, Copy, PartialEq, Component)]
-pub struct Origin {
-    /// Material site of birth.
-    pub site: Site,
-    /// Heading at birth.
-    pub heading: FirstHeading,
+/// The birth of a growth cone. Where it is born says its [`Site`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Birth {
+    /// Instant, in ticks.
+    pub instant: u64,
+    /// Place of the cone among all cones.
+    pub cone: u32,
+    /// The face of its site's cell along whose inner normal it heads, in the configuration at birth; none for a heading that is fixed, and
+    /// stands in its [`SpringState`].
+    pub face: Option<u8>,
 }
 
-/// The heading a cone is born with.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum FirstHeading {
-    /// Along the inner normal of a border facet, in the configuration at birth.
-    InnerNormal(BorderFacet),
-    /// A fixed unit vector.
-    Fixed(Vector3<f64>),
-}
-
-/// The cones in order of birth.
+/// The births that are still to come, the next one last.
 #[derive(Debug, Clone, Default, Resource)]
 pub struct BirthQueue {
-    order: Vec<(u64, u32)>,
-    next: usize,
+    waiting: Vec<Birth>,
 }
 
-kept! { struct BirthQueue { order, next } }
+kept! { struct Birth { instant, cone, face } }
+kept! { struct BirthQueue { waiting } }
 
 impl BirthQueue {
-    /// A queue of births: the instant (ticks) of each cone, in order of the cones.
-    pub fn new(births: impl Iterator<Item = u64>) -> Self {
-        let mut order: Vec<(u64, u32)> = births.zip(0..).collect();
-        order.sort_unstable();
-        Self { order, next: 0 }
+    /// A queue of births.
+    pub fn new(mut births: Vec<Birth>) -> Self {
+        births.sort_unstable_by(|a, b| b.cmp(a));
+        Self { waiting: births }
+    }
+
+    /// The births that are still to come, the next one last.
+    pub fn waiting(&self) -> &[Birth] {
+        &self.waiting
     }
 
     /// Whether a queue that nobody was taken from may become `later`.
     pub(super) fn may_become(&self, later: &Self) -> bool {
-        later.order == self.order && later.next <= later.order.len()
+        self.waiting.starts_with(&later.waiting)
     }
 
-    fn take_before(&mut self, instant: u64) -> &[(u64, u32)] {
-        let due = self.order[self.next..].iter().take_while(|(birth, _)| *birth < instant).count();
-        let from = self.next;
-        self.next += due;
-        &self.order[from..self.next]
+    /// Takes those before an instant out of the queue, first ones first.
+    fn take_before(&mut self, instant: u64) -> Vec<Birth> {
+        let left = self.waiting.partition_point(|birth| birth.instant >= instant);
+        let due = self.waiting.drain(left..).rev().collect();
+        if self.waiting.len() < self.waiting.capacity() / 2 {
+            self.waiting.shrink_to_fit();
+        }
+        due
     }
 }
-
-/// Inner unit normal of a border facet at given coordinates.
-pub fn inner_normal(tissue: &Tissue, coordinates: &(impl AtVertices<2> + ?Sized), facet: BorderFacet) -> Vector3<f64> {
-    let ends: Vec<_> = tissue.mesh.facet_vertices(facet).map(|v| coordinates.at(v as usize)).collect();
-    let along = [ends[1][0] - ends[0][0], ends[1][1] - ends[0][1]];
+/// Inner unit normal of a face of a cell, opposite its local vertex `face`.
+fn inner_normal(tissue: &Tissue, coordinates: &impl AtVertices<2>, cell: u32, face: u8) -> Vector3<f64> {
+    let corners = tissue.mesh.cell(cell as usize);
+    let [from, to] = [1, 2].map(|k| coordinates.at(corners[(usize::from(face) + k) % 3] as usize));
+    let along = [to[0] - from[0], to[1] - from[1]];
     let length = along[0].hypot(along[1]);
     Vector3::new(-along[1] / length, along[0] / length, 0.0)
 }
@@ -81,10 +81,10 @@ impl Altered<'_> {
     /// Begins at a site with its position (µm), with a unit heading and a speed (µm/h), at a time (h).
     pub(super) fn begin(self, (site, position): (Site, Vector3<f64>), heading: Vector3<f64>, speed: f64, hours: f64) {
         *self.status = Status::Growing;
-        (*self.site, self.position.0) = (site, position);
-        self.velocity.growth = heading * speed;
-        *self.spring = SpringState { heading, ..SpringState::default() };
-        (self.journey.first_heading, self.journey.ended) = (heading.into(), hours);
+        (*self.site, self.position.0) = (site, position.xy());
+        self.velocity.growth = heading.xy() * speed;
+        *self.spring = Spring::heading_along(heading).into();
+        (self.journey.first_heading, self.journey.ended) = (heading.xy().into(), hours);
     }
 }
 
@@ -115,7 +115,6 @@ impl AlteredColumns<'_> {
 
 type Unborn = (
     &'static GrowthCone,
-    &'static Origin,
     &'static mut Status,
     &'static mut Site,
     &'static mut Position,
@@ -138,9 +137,7 @@ pub fn give_birth(
         return;
     }
     let Ok(mut tables) = cones.contiguous_iter_mut() else { return };
-    let Some((cones, origins, mut status, mut site, mut position, mut velocity, mut spring, mut journey)) =
-        tables.next()
-    else {
+    let Some((cones, mut status, mut site, mut position, mut velocity, mut spring, mut journey)) = tables.next() else {
         return;
     };
     let mut columns = AlteredColumns {
@@ -151,15 +148,15 @@ pub fn give_birth(
         spring: spring.bypass_change_detection(),
         journey: journey.bypass_change_detection(),
     };
-    for &(_, index) in due {
-        let i = index as usize;
-        let heading = match origins[i].heading {
-            FirstHeading::InnerNormal(facet) => inner_normal(&tissue, &*configuration, facet),
-            FirstHeading::Fixed(heading) => heading,
+    for Birth { cone, face, .. } in due {
+        let i = cone as usize;
+        let (site, hours) = (columns.site[i], cones[i].birth_time(&clock.grid));
+        let heading = match face {
+            Some(face) => inner_normal(&tissue, &*configuration, site.cell, face),
+            None => columns.spring[i].seen().heading,
         };
-        let place = (origins[i].site, configuration.position(&tissue.mesh, origins[i].site));
-        columns.at(i).begin(place, heading, cones[i].speed, cones[i].birth_time);
-        let at = tissue.reference_position(origins[i].site);
-        shafts.start(i, origins[i].site, [at.x, at.y], cones[i].birth_time);
+        columns.at(i).begin((site, configuration.position(&tissue.mesh, site)), heading, cones[i].speed, hours);
+        let at = tissue.reference_position(site);
+        shafts.start(i, site, [at.x, at.y], hours);
     }
 }

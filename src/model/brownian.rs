@@ -21,6 +21,14 @@ pub struct BrownianTree {
     tick: f64,
 }
 
+/// An interval of 2^level ticks of one axon's path, its length (h) and the increment over it (√h).
+struct Interval<const N: usize> {
+    level: u32,
+    index: u64,
+    length: f64,
+    increment: [f64; N],
+}
+
 /// The Brownian paths of headings; absent in a scene without heading diffusion.
 #[derive(Debug, Clone, Copy, Resource)]
 pub struct HeadingPaths(pub BrownianTree);
@@ -35,32 +43,36 @@ impl BrownianTree {
     /// direction in the plane and two in space; the first component is the same for both.
     pub fn increment<const N: usize>(&self, axon: u32, from: u64, to: u64) -> [f64; N] {
         let mut sum = [0.0; N];
-        let mut at = from;
-        while at < to {
-            let aligned = at.trailing_zeros().min(ROOT_LEVEL);
-            let fits = (to - at).ilog2().min(ROOT_LEVEL);
-            let level = aligned.min(fits);
-            let part = self.interval::<N>(axon, level, at >> level);
-            sum = std::array::from_fn(|i| sum[i] + part[i]);
-            at += 1 << level;
+        if from == to {
+            return sum;
+        }
+        for root in from >> ROOT_LEVEL..to.div_ceil(1 << ROOT_LEVEL) {
+            let length = self.tick * 2f64.powi(ROOT_LEVEL as i32);
+            let scale = length.sqrt();
+            let increment = self.normals::<N>(axon, ROOT_LEVEL, root).map(|z| scale * z);
+            self.add_part(axon, (from, to), Interval { level: ROOT_LEVEL, index: root, length, increment }, &mut sum);
         }
         sum
     }
 
-    /// Increment over the interval `index` of 2^level ticks, from its root down.
-    fn interval<const N: usize>(&self, axon: u32, level: u32, index: u64) -> [f64; N] {
-        let root = index >> (ROOT_LEVEL - level);
-        let mut width = self.tick * 2f64.powi(ROOT_LEVEL as i32);
-        let scale = width.sqrt();
-        let mut increment = self.normals::<N>(axon, ROOT_LEVEL, root).map(|z| scale * z);
-        for below in (level..ROOT_LEVEL).rev() {
-            let child = index >> (below - level);
-            let bridge = 0.5 * width.sqrt() * if child & 1 == 0 { 1.0 } else { -1.0 };
-            let z = self.normals::<N>(axon, below, child >> 1);
-            increment = std::array::from_fn(|i| 0.5 * increment[i] + bridge * z[i]);
-            width *= 0.5;
+    /// Adds the increment over what an interval and a span of ticks have in common, which is something: its own, or those of its halves.
+    fn add_part<const N: usize>(&self, axon: u32, span: (u64, u64), whole: Interval<N>, sum: &mut [f64; N]) {
+        let Interval { level, index, length, increment } = whole;
+        let (start, end) = (index << level, (index + 1) << level);
+        if span.0 <= start && end <= span.1 {
+            *sum = std::array::from_fn(|i| sum[i] + increment[i]);
+            return;
         }
-        increment
+        let z = self.normals::<N>(axon, level - 1, index);
+        let middle = start + (1 << (level - 1));
+        for (side, is_met) in [(0, span.0 < middle), (1, middle < span.1)] {
+            if is_met {
+                let bridge = 0.5 * length.sqrt() * if side == 0 { 1.0 } else { -1.0 };
+                let increment = std::array::from_fn(|i| 0.5 * increment[i] + bridge * z[i]);
+                let half = Interval { level: level - 1, index: 2 * index + side, length: 0.5 * length, increment };
+                self.add_part(axon, span, half, sum);
+            }
+        }
     }
 
     fn normals<const N: usize>(&self, axon: u32, level: u32, index: u64) -> [f64; N] {

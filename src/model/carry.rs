@@ -3,22 +3,16 @@
 //! The site already rides the tissue, so v_φ is reported and never added to the motion again. Installed only in a scene
 //! whose tissue moves.
 
-use super::components::{GrowthCone, Site, Velocity};
-use super::cones::Cones;
+use super::components::Velocity;
+use super::cones::{Cones, ConesWith};
 use super::configuration::Configuration;
 use super::growth::Growth;
 use super::tissue::Tissue;
-use bevy_ecs::prelude::{Query, Res, With};
+use bevy_ecs::prelude::Res;
 
-/// Writes v_φ of each cone.
-pub fn carry(
-    tissue: Res<Tissue>,
-    configuration: Res<Configuration>,
-    mut cones: Query<(&Site, &mut Velocity), With<GrowthCone>>,
-) {
-    for (site, mut velocity) in &mut cones {
-        velocity.tissue = configuration.velocity(&tissue.mesh, *site);
-    }
+/// Writes v_φ of each growing cone.
+pub fn carry(tissue: Res<Tissue>, configuration: Res<Configuration>, mut cones: ConesWith<Velocity>) {
+    cones.for_each(|cone, _, velocity| velocity.tissue = configuration.velocity(&tissue.mesh, cone.site).xy());
 }
 
 /// Ours, `heading_follows: spin`: the rotation R of F = R U turns headings as it turns shafts.

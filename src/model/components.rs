@@ -1,41 +1,45 @@
-//! Axons and growth cones as entities.
+//! Axons as entities.
 //!
-//! A growth cone is the tip of an axon. All growth cones live in one archetype in order of their axon, from the start of
+//! An axon is the entity of its growth cone, its tip; what the tip leaves behind stands in [`Shafts`](super::shafts::Shafts) under the
+//! place of the cone. A branch is such an entity too. All growth cones live in one archetype in order of their axon, from the start of
 //! the run to its end: none is added, removed or given other components while it runs, so that the storage stays
 //! contiguous and the order of iteration is the same always.
+//!
+//! There are millions of them, and a step passes over all several times: vectors are stored in the plane, two numbers each. Mechanisms
+//! see them in space, with a third one that is exactly 0 ([`Cone`](super::cones::Cone), [`Spring`]).
 
+use super::clock::TimeGrid;
+use super::tissue::lift;
 use crate::kept;
 use crate::numerics::locate::MaterialPoint;
 use bevy_ecs::prelude::Component;
-use nalgebra::Vector3;
-
-/// An axon: where it comes from.
-#[derive(Debug, Clone, Copy, PartialEq, Component)]
-pub struct Axon {
-    /// Number of the axon, which keys its random draws.
-    pub number: u32,
-    /// Index of its population.
-    pub population: u16,
-    /// Instant of birth, in ticks of the [clock](super::clock).
-    pub birth: u64,
-}
+use nalgebra::{Vector2, Vector3};
+use std::sync::Arc;
 
 /// The tip of an axon.
 #[derive(Debug, Clone, Copy, PartialEq, Component)]
 pub struct GrowthCone {
-    /// Number of the axon it belongs to.
+    /// Number of the axon it belongs to, which keys its random draws.
     pub axon: u32,
     /// Index of its population.
     pub population: u16,
     /// Nominal speed v_g (µm/h).
     pub speed: f64,
-    /// Instant of birth, in ticks.
+    /// Instant of birth, in ticks of the [clock](super::clock); [`NEVER`](Self::NEVER) for a cone that waits for a branch.
     pub birth: u64,
-    /// Time of birth (h).
-    pub birth_time: f64,
 }
 
-kept! { struct GrowthCone { axon, population, speed, birth, birth_time } }
+kept! { struct GrowthCone { axon, population, speed, birth } }
+
+impl GrowthCone {
+    /// Instant of birth of a cone that waits for a branch.
+    pub const NEVER: u64 = u64::MAX;
+
+    /// Time of birth (h); 0 for a cone that waits for a branch.
+    pub fn birth_time(&self, grid: &TimeGrid) -> f64 {
+        if self.birth == Self::NEVER { 0.0 } else { grid.hours(self.birth) }
+    }
+}
 
 /// What a growth cone is doing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Component)]
@@ -82,13 +86,13 @@ impl Status {
 }
 
 /// Where a growth cone sits in the tissue: a cell of its mesh and barycentric weights. It is this material point that is
-/// integrated; the [`Position`] follows from it.
+/// integrated; the [`Position`] follows from it. Before birth: where it will be born.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Component)]
 pub struct Site {
     /// The cell.
     pub cell: u32,
-    /// Weights of the cell's vertices 1, 2 (and 3 in space); vertex 0 has the rest.
-    pub weights: [f64; 3],
+    /// Weights of the cell's vertices 1 and 2; vertex 0 has the rest.
+    pub weights: [f64; 2],
 }
 
 kept! { struct Site { cell, weights } }
@@ -101,51 +105,111 @@ impl Site {
 
     /// The point of a planar mesh.
     pub fn planar(self) -> MaterialPoint<2> {
-        MaterialPoint { cell: self.cell, weights: [self.weights[0], self.weights[1]] }
+        MaterialPoint { cell: self.cell, weights: self.weights }
     }
 }
 
 impl From<MaterialPoint<2>> for Site {
     fn from(point: MaterialPoint<2>) -> Self {
-        Self { cell: point.cell, weights: [point.weights[0], point.weights[1], 0.0] }
+        Self { cell: point.cell, weights: point.weights }
     }
 }
 
-/// Position x = φ(X, t) (µm); z is exactly 0 in a planar scene.
-#[derive(Debug, Clone, Copy, PartialEq, Component)]
-pub struct Position(pub Vector3<f64>);
+/// Position x = φ(X, t) (µm).
+#[derive(Debug, Clone, Copy, PartialEq, Default, Component)]
+pub struct Position(pub Vector2<f64>);
 
 kept! { wrapper Position }
 
-impl Default for Position {
-    fn default() -> Self {
-        Self(Vector3::zeros())
+impl Position {
+    /// In space.
+    #[inline]
+    pub fn in_space(&self) -> Vector3<f64> {
+        lift(self.0.into())
     }
 }
 
-/// Velocity Ẋ_d = v_g + v_φ, eq. (1) (µm/h).
-#[derive(Debug, Clone, Copy, PartialEq, Component)]
+/// Velocity Ẋ_d = v_g + v_φ, eq. (1) (µm/h), as of the last step in which the cone grew.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Component)]
 pub struct Velocity {
     /// v_g, along the heading.
-    pub growth: Vector3<f64>,
+    pub growth: Vector2<f64>,
     /// v_φ, the velocity of the tissue at the cone. Reported only: the site already rides the tissue.
-    pub tissue: Vector3<f64>,
+    pub tissue: Vector2<f64>,
 }
 
 kept! { struct Velocity { growth, tissue } }
 
-impl Default for Velocity {
+/// The [`Spring`] of a growth cone as it is stored. Before birth its heading is the one the cone will be born with, if that is fixed.
+#[derive(Debug, Clone, Copy, PartialEq, Component)]
+pub struct SpringState {
+    heading: Vector2<f64>,
+    drift: f64,
+    pull: Vector2<f64>,
+    speed_factor: f64,
+    heading_diffusion: f64,
+    spin: f64,
+}
+
+kept! { struct SpringState { heading, drift, pull, speed_factor, heading_diffusion, spin } }
+
+impl Default for SpringState {
     fn default() -> Self {
-        Self { growth: Vector3::zeros(), tissue: Vector3::zeros() }
+        Spring::heading_along(Vector3::zeros()).into()
     }
 }
 
-/// The lumped spring of the filopodia, eq. (1): where the cone heads, and what pulls it.
+impl SpringState {
+    /// The spring in space.
+    #[inline]
+    pub fn seen(&self) -> Spring {
+        Spring {
+            heading: lift(self.heading.into()),
+            drift: self.drift,
+            pull: lift(self.pull.into()),
+            speed_factor: self.speed_factor,
+            heading_diffusion: self.heading_diffusion,
+            spin: Vector3::new(0.0, 0.0, self.spin),
+        }
+    }
+
+    /// Unit heading e_g.
+    #[inline]
+    pub fn heading(&self) -> Vector2<f64> {
+        self.heading
+    }
+
+    /// Lets `act` change the spring as it is seen.
+    #[inline]
+    pub fn change<T>(&mut self, act: impl FnOnce(&mut Spring) -> T) -> T {
+        let mut seen = self.seen();
+        let result = act(&mut seen);
+        *self = seen.into();
+        result
+    }
+}
+
+impl From<Spring> for SpringState {
+    #[inline]
+    fn from(seen: Spring) -> Self {
+        Self {
+            heading: seen.heading.xy(),
+            drift: seen.drift,
+            pull: seen.pull.xy(),
+            speed_factor: seen.speed_factor,
+            heading_diffusion: seen.heading_diffusion,
+            spin: seen.spin.z,
+        }
+    }
+}
+
+/// The lumped spring of the filopodia, eq. (1): where the cone heads, and what pulls it. What lies out of the plane, of a planar scene,
+/// is dropped when it is stored: the third number of headings and pulls, the first two of spins.
 ///
 /// Mechanisms add to `pull`, `heading_diffusion` and `spin` and multiply `speed_factor`; the integrator clears the four before
 /// each stage and alone changes the rest.
-#[derive(Debug, Clone, Copy, PartialEq, Component)]
-pub struct SpringState {
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Spring {
     /// Unit heading e_g.
     pub heading: Vector3<f64>,
     /// |v_g| over its nominal value: 1 for `rotation`, drifting for the explicit methods, which act on the vector v_g.
@@ -160,12 +224,11 @@ pub struct SpringState {
     pub spin: Vector3<f64>,
 }
 
-kept! { struct SpringState { heading, drift, pull, speed_factor, heading_diffusion, spin } }
-
-impl Default for SpringState {
-    fn default() -> Self {
+impl Spring {
+    /// At rest, with a unit heading.
+    pub fn heading_along(heading: Vector3<f64>) -> Self {
         Self {
-            heading: Vector3::zeros(),
+            heading,
             drift: 1.0,
             pull: Vector3::zeros(),
             speed_factor: 1.0,
@@ -173,9 +236,7 @@ impl Default for SpringState {
             spin: Vector3::zeros(),
         }
     }
-}
 
-impl SpringState {
     /// Clears what mechanisms add to, before a stage.
     pub fn clear(&mut self) {
         self.pull = Vector3::zeros();
@@ -191,9 +252,10 @@ impl SpringState {
     }
 }
 
-/// Receptor weights λ_i(t), one for each receptor of the cone's population, in the order of the scenario (dimensionless).
+/// Receptor weights λ_i(t), one for each receptor of the cone's population, in the order of the scenario (dimensionless). Cones whose
+/// weights never change share them.
 #[derive(Debug, Clone, PartialEq, Default, Component)]
-pub struct ReceptorWeights(pub Box<[f64]>);
+pub struct ReceptorWeights(pub Arc<[f64]>);
 
 kept! { wrapper ReceptorWeights }
 
@@ -201,7 +263,7 @@ kept! { wrapper ReceptorWeights }
 #[derive(Debug, Clone, Copy, PartialEq, Default, Component)]
 pub struct Journey {
     /// Unit heading at birth.
-    pub first_heading: [f64; 3],
+    pub first_heading: [f64; 2],
     /// Time at which it arrived, stalled or left (h); NaN-free: equals the birth time until then.
     pub ended: f64,
     /// Length grown, ∫|v_g| dt (µm).

@@ -1,6 +1,6 @@
 //! How a mechanism meets the growth cones: one view of each that is growing, and the spring state it may add to.
 
-use super::components::{GrowthCone, Position, ReceptorWeights, Site, SpringState, Status};
+use super::components::{GrowthCone, Position, ReceptorWeights, Site, Spring, SpringState, Status};
 use bevy_ecs::prelude::{Component, Query, With};
 use bevy_ecs::system::SystemParam;
 use nalgebra::Vector3;
@@ -43,7 +43,7 @@ pub struct Cones<'w, 's> {
 impl Cones<'_, '_> {
     /// Calls `act` for every growing cone, in parallel. `act` reads the cone and writes its own spring state, so the result does not
     /// depend on the number of threads.
-    pub fn for_each(&mut self, act: impl Fn(Cone, &mut SpringState) + Sync) {
+    pub fn for_each(&mut self, act: impl Fn(Cone, &mut Spring) + Sync) {
         let Ok(tables) = self.query.contiguous_iter_mut() else { return };
         let mut first = 0;
         for (identities, statuses, sites, positions, receptors, mut springs) in tables {
@@ -55,15 +55,16 @@ impl Cones<'_, '_> {
                 .enumerate()
                 .filter(|(_, (_, status, ..))| **status == Status::Growing)
                 .for_each(|(i, (identity, _, site, position, receptors, spring))| {
-                    let index = first + i;
-                    act(Cone { index, identity, site: *site, position: position.0, receptors: &receptors.0 }, spring);
+                    let (index, position) = (first + i, position.in_space());
+                    let cone = Cone { index, identity, site: *site, position, receptors: &receptors.0 };
+                    spring.change(|spring| act(cone, spring));
                 });
             first += count;
         }
     }
 
     /// What `look` sees of each growing cone, in their order.
-    pub fn collect<T: Send>(&self, look: impl Fn(Cone, &SpringState) -> T + Sync) -> Vec<T> {
+    pub fn collect<T: Send>(&self, look: impl Fn(Cone, &Spring) -> T + Sync) -> Vec<T> {
         let columns = self.columns();
         let mut seen = Vec::new();
         for (first, table) in &columns.0 {
@@ -71,7 +72,7 @@ impl Cones<'_, '_> {
             let growing = growing.filter(|(_, status)| **status == Status::Growing);
             seen.par_extend(growing.map(|(i, _)| {
                 let (cone, spring) = of_table(*first, table, i);
-                look(cone, spring)
+                look(cone, &spring)
             }));
         }
         seen
@@ -89,7 +90,7 @@ impl Cones<'_, '_> {
     }
 
     /// Calls `act` for the cones at some places, each with a value of its own.
-    pub fn apply_at<T>(&mut self, values: impl Iterator<Item = (usize, T)>, act: impl Fn(&mut SpringState, T)) {
+    pub fn apply_at<T>(&mut self, values: impl Iterator<Item = (usize, T)>, act: impl Fn(&mut Spring, T)) {
         let mut first = 0;
         let mut tables = Vec::new();
         for (identities, .., springs) in self.query.contiguous_iter_mut().into_iter().flatten() {
@@ -99,7 +100,7 @@ impl Cones<'_, '_> {
         for (index, value) in values {
             let table = tables.partition_point(|(first, _)| *first <= index) - 1;
             let (first, springs) = &mut tables[table];
-            act(&mut springs.bypass_change_detection()[index - *first], value);
+            springs.bypass_change_detection()[index - *first].change(|spring| act(spring, value));
         }
     }
 
@@ -109,10 +110,10 @@ impl Cones<'_, '_> {
     }
 
     /// Calls `act` for each growing cone with its own of `values`, which are in the order of [`Self::collect`].
-    pub fn apply<T>(&mut self, values: &[T], act: impl Fn(&mut SpringState, &T)) {
+    pub fn apply<T>(&mut self, values: &[T], act: impl Fn(&mut Spring, &T)) {
         let growing = self.query.iter_mut().filter(|(_, status, ..)| **status == Status::Growing);
         for ((.., mut spring), value) in growing.zip(values) {
-            act(&mut spring, value);
+            spring.change(|spring| act(spring, value));
         }
     }
 }
@@ -121,10 +122,11 @@ impl Cones<'_, '_> {
 type Table<'a> = (&'a [GrowthCone], &'a [Status], &'a [Site], &'a [Position], &'a [ReceptorWeights], &'a [SpringState]);
 
 /// The i-th cone of a table whose first has the place `first`.
-fn of_table<'a>(first: usize, table: &Table<'a>, i: usize) -> (Cone<'a>, &'a SpringState) {
+fn of_table<'a>(first: usize, table: &Table<'a>, i: usize) -> (Cone<'a>, Spring) {
     let (identities, _, sites, positions, receptors, springs) = table;
     let (index, receptors) = (first + i, &*receptors[i].0);
-    (Cone { index, identity: &identities[i], site: sites[i], position: positions[i].0, receptors }, &springs[i])
+    let cone = Cone { index, identity: &identities[i], site: sites[i], position: positions[i].in_space(), receptors };
+    (cone, springs[i].seen())
 }
 
 /// All growth cones, to be looked at by place.
@@ -133,7 +135,7 @@ pub struct ConeColumns<'a>(Vec<(usize, Table<'a>)>);
 impl<'a> ConeColumns<'a> {
     /// The cone at a place that some view of a cone [named](Cone::index), and its spring state.
     #[inline]
-    pub fn at(&self, index: usize) -> (Cone<'a>, &'a SpringState) {
+    pub fn at(&self, index: usize) -> (Cone<'a>, Spring) {
         let table = self.0.partition_point(|(first, _)| *first <= index) - 1;
         let (first, table) = &self.0[table];
         of_table(*first, table, index - first)
@@ -153,7 +155,7 @@ pub struct ConesWith<'w, 's, C: Component<Mutability = bevy_ecs::component::Muta
 impl<C: Component<Mutability = bevy_ecs::component::Mutable>> ConesWith<'_, '_, C> {
     /// Calls `act` for every growing cone, in parallel, with its spring state to read and its component `C` to write.
     /// The view's receptors are empty.
-    pub fn for_each(&mut self, act: impl Fn(Cone, &SpringState, &mut C) + Sync) {
+    pub fn for_each(&mut self, act: impl Fn(Cone, &Spring, &mut C) + Sync) {
         let Ok(tables) = self.query.contiguous_iter_mut() else { return };
         let mut first = 0;
         for (identities, statuses, sites, positions, springs, mut own) in tables {
@@ -165,8 +167,8 @@ impl<C: Component<Mutability = bevy_ecs::component::Mutable>> ConesWith<'_, '_, 
                 .enumerate()
                 .filter(|(_, (_, status, ..))| **status == Status::Growing)
                 .for_each(|(i, (identity, _, site, position, spring, own))| {
-                    let index = first + i;
-                    act(Cone { index, identity, site: *site, position: position.0, receptors: &[] }, spring, own);
+                    let (index, position) = (first + i, position.in_space());
+                    act(Cone { index, identity, site: *site, position, receptors: &[] }, &spring.seen(), own);
                 });
             first += count;
         }

@@ -249,7 +249,7 @@ impl Configuration {
     #[inline]
     pub fn position(&self, mesh: &SimplexMesh<2>, site: Site) -> Vector3<f64> {
         let [a, b, c] = at_corners(mesh, self, site.cell);
-        let [second, third, _] = site.weights;
+        let [second, third] = site.weights;
         let at = |k: usize| (1.0 - second - third) * a[k] + second * b[k] + third * c[k];
         Vector3::new(at(0), at(1), 0.0)
     }

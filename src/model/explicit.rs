@@ -5,7 +5,7 @@
 //! before the step, half after it.
 
 use super::clock::Clock;
-use super::components::SpringState;
+use super::components::Spring;
 use super::integrator::{bring_tissue_to, evaluate_right_hand_side};
 use super::movers::{ConeQuery, Mover, Step, StepStart, each_growing, flat};
 use crate::numerics::runge_kutta::ButcherTableau;
@@ -48,7 +48,8 @@ pub(super) fn run_stages(
 fn enter_stage(step: &Step, mover: &mut Mover, tableau: &ButcherTableau, stage: usize) {
     let spring = &mut *mover.spring;
     if stage == 0 {
-        mover.start.begin(*mover.site, spring.heading, spring.drift);
+        mover.start.begin(*mover.site, spring.heading);
+        mover.start.stages().drift = spring.drift;
     }
     let duration = step.duration(mover.cone);
     let (shift, vector) = combined(mover.start, tableau.a[stage], duration);
@@ -59,20 +60,20 @@ fn enter_stage(step: &Step, mover: &mut Mover, tableau: &ButcherTableau, stage: 
     match walk(&step.tissue.mesh, step.tissue.mesh.vertices(), from.planar(), flat(shift), &nowhere(BorderRule::Slide))
     {
         Ok(walked) => *mover.site = walked.point.into(),
-        Err(fault) => mover.start.fault = Some(fault.into()),
+        Err(fault) => mover.start.blame(fault),
     }
-    mover.position.0 = step.configuration.position(&step.tissue.mesh, *mover.site);
+    mover.position.0 = step.configuration.position(&step.tissue.mesh, *mover.site).xy();
 }
 
 fn keep_rates(step: &Step, mover: &mut Mover, stage: usize) {
     if stage == 0 {
         let start = step.start(mover.cone);
         let middle = start + (step.to - start) / 2;
-        let heading = mover.start.heading;
+        let heading = mover.start.heading();
         let stages = mover.start.stages();
         (stages.unkicked, stages.sampled) = (heading, *mover.spring);
-        mover.start.heading = step.kicked(mover.cone, heading, mover.spring.heading_diffusion, (start, middle));
-        mover.spring.heading = mover.start.heading;
+        mover.spring.heading = step.kicked(mover.cone, heading, mover.spring.heading_diffusion, (start, middle));
+        mover.start.set_heading(mover.spring.heading);
     }
     let spring = &*mover.spring;
     let velocity = spring.heading * (mover.cone.speed * spring.speed_factor * spring.drift);
@@ -100,14 +101,15 @@ pub(super) fn finish(step: &Step, mover: &mut Mover, tableau: &ButcherTableau) {
 /// the first half is another.
 pub(super) fn start_again(step: &Step, mover: &mut Mover) {
     let start = &mut *mover.start;
-    start.heading = start.stages().unkicked;
-    start.fault = None;
+    let unkicked = start.stages().unkicked;
+    start.set_heading(unkicked);
+    start.forgive();
     keep_rates(step, mover, 0);
 }
 
 /// By how much the two methods of an embedded pair differ after a step, all of whose stages have been evaluated:
 /// displacement (µm, in the present configuration) and velocity vector over v_g.
-pub(super) fn difference(step: &Step, mover: &Mover, pair: &ButcherTableau) -> (Vector3<f64>, Vector3<f64>) {
+pub(super) fn difference(step: &Step, mover: &mut Mover, pair: &ButcherTableau) -> (Vector3<f64>, Vector3<f64>) {
     let duration = step.duration(mover.cone);
     let (mut shift, mut vector) = (Vector3::zeros(), Vector3::zeros());
     for ((b, other), (velocity, turning)) in pair.b.iter().zip(pair.embedded).zip(mover.start.rates()) {
@@ -118,9 +120,9 @@ pub(super) fn difference(step: &Step, mover: &Mover, pair: &ButcherTableau) -> (
 }
 
 /// Displacement (reference, µm) and velocity vector over v_g after `duration` with the weights of a tableau row.
-fn combined(start: &StepStart, weights: &[f64], duration: f64) -> (Vector3<f64>, Vector3<f64>) {
+fn combined(start: &mut StepStart, weights: &[f64], duration: f64) -> (Vector3<f64>, Vector3<f64>) {
     let mut shift = Vector3::zeros();
-    let mut vector = start.heading * start.drift;
+    let mut vector = start.heading() * start.stages().drift;
     for (&weight, (velocity, turning)) in weights.iter().zip(start.rates()) {
         shift += velocity * (weight * duration);
         vector += turning * (weight * duration);
@@ -128,7 +130,7 @@ fn combined(start: &StepStart, weights: &[f64], duration: f64) -> (Vector3<f64>,
     (shift, vector)
 }
 
-fn set_vector(spring: &mut SpringState, vector: Vector3<f64>) {
+fn set_vector(spring: &mut Spring, vector: Vector3<f64>) {
     let norm = vector.norm();
     if norm > 0.0 {
         spring.heading = vector / norm;

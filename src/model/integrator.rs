@@ -63,7 +63,7 @@ fn report_broken_tissue(world: &mut World) {
 }
 
 fn report_lost_cones(world: &mut World, starts: &[StepStart]) {
-    let lost = starts.iter().enumerate().find_map(|(i, start)| start.fault.as_ref().map(|fault| (i, fault)));
+    let lost = starts.iter().enumerate().find_map(|(i, start)| Some(i).zip(start.fault()));
     if let Some((i, fault)) = lost {
         let time = world.resource::<StageTime>().0;
         // The tip of the shaft is where the cone was at the end of the last step.
@@ -110,7 +110,7 @@ fn rotation_step(world: &mut World, cones: &mut ConeQuery, starts: &mut [StepSta
 fn predict_midpoint(step: &Step, mover: &mut Mover) {
     let half = 0.5 * step.duration(mover.cone);
     let spring = &mut *mover.spring;
-    mover.start.begin(*mover.site, spring.heading, spring.drift);
+    mover.start.begin(*mover.site, spring.heading);
     let speed = mover.cone.speed * spring.speed_factor;
     let forward = spring.heading * (speed * half);
     spring.heading = spun(
@@ -125,7 +125,7 @@ fn finish_rotation(step: &Step, mover: &mut Mover) {
     let duration = step.duration(mover.cone);
     let half_turn = 0.5 * step.growth.turning_rate * duration;
     let spring = *mover.spring;
-    let before = turn(&mover.start.heading, &spring.pull, half_turn);
+    let before = turn(&mover.start.heading(), &spring.pull, half_turn);
     let spinning = spun(before, spring.spin * duration, step.growth.planar);
     let after = step.kicked(mover.cone, spinning, spring.heading_diffusion, (step.start(mover.cone), step.to));
     mover.spring.heading = turn(&after, &spring.pull, half_turn);

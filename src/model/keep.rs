@@ -4,8 +4,9 @@
 //! with [`kept!`](crate::kept!); a field that is forgotten does not compile.
 
 use crate::numerics::locate::MaterialPoint;
-use nalgebra::Vector3;
+use nalgebra::SVector;
 use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
 
 /// What was written down does not read back: where and why.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -158,15 +159,21 @@ impl<T: Keep> Keep for Vec<T> {
     }
 }
 
-impl<T: Keep> Keep for Box<[T]> {
-    fn keep(&self, into: &mut Vec<u8>) {
-        keep_all(self.iter(), into);
-    }
+macro_rules! kept_slices {
+    ($($slice:ident),*) => { $(
+        impl<T: Keep> Keep for $slice<[T]> {
+            fn keep(&self, into: &mut Vec<u8>) {
+                keep_all(self.iter(), into);
+            }
 
-    fn restore(from: &mut KeptBytes) -> Result<Self, Damage> {
-        Ok(from.read::<Vec<T>>()?.into_boxed_slice())
-    }
+            fn restore(from: &mut KeptBytes) -> Result<Self, Damage> {
+                Ok(from.read::<Vec<T>>()?.into())
+            }
+        }
+    )* };
 }
+
+kept_slices!(Box, Arc);
 
 impl<T: Keep + Copy + Default, const N: usize> Keep for [T; N] {
     fn keep(&self, into: &mut Vec<u8>) {
@@ -217,13 +224,13 @@ impl<T: Keep + Ord> Keep for BTreeSet<T> {
     }
 }
 
-impl Keep for Vector3<f64> {
+impl<const N: usize> Keep for SVector<f64, N> {
     fn keep(&self, into: &mut Vec<u8>) {
-        <[f64; 3]>::from(*self).keep(into);
+        self.iter().for_each(|x| x.keep(into));
     }
 
     fn restore(from: &mut KeptBytes) -> Result<Self, Damage> {
-        Ok(from.read::<[f64; 3]>()?.into())
+        Ok(from.read::<[f64; N]>()?.into())
     }
 }
 
@@ -338,7 +345,8 @@ mod tests {
             assert_eq!(again(&f64::from_bits(bits)).to_bits(), bits);
         }
         assert_eq!(again(&(u64::MAX, i64::MIN)), (u64::MAX, i64::MIN));
-        assert_eq!(again(&Vector3::new(1.0, -0.1, 1e-300)), Vector3::new(1.0, -0.1, 1e-300));
+        let vector = SVector::from([1.0, -0.1, 1e-300]);
+        assert_eq!(again(&vector), vector);
     }
 
     #[test]

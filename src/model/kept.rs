@@ -174,7 +174,7 @@ mod tests {
         let mut world = World::new();
         world.insert_resource(Memory { number: 0.1 });
         for number in numbers {
-            let cone = GrowthCone { axon: 0, population: 0, speed: 1.0, birth: 0, birth_time: 0.0 };
+            let cone = GrowthCone { axon: 0, population: 0, speed: 1.0, birth: 0 };
             world.spawn((cone, Journey { length: *number, ..Journey::default() }));
         }
         let mut kept = KeptState::default();

@@ -2,15 +2,15 @@
 
 use super::brownian::HeadingPaths;
 use super::clock::Clock;
-use super::components::{GrowthCone, Journey, Position, Site, SpringState, Status, Velocity};
+use super::components::{GrowthCone, Journey, Position, Site, Spring, SpringState, Status, Velocity};
 use super::configuration::Configuration;
 use super::growth::{Growth, OnBorder, Targets};
-use super::tissue::Tissue;
+use super::tissue::{Tissue, lift};
 use crate::numerics::coordinates::AtVertices;
 use crate::numerics::turning::kick;
 use crate::numerics::walk::{BorderRule, Walk, WalkEnd, WalkError, WalkRules, nowhere, walk};
 use bevy_ecs::prelude::{QueryState, With, World};
-use nalgebra::Vector3;
+use nalgebra::{Vector2, Vector3};
 use rayon::prelude::*;
 
 const CHUNK: usize = 64;
@@ -34,21 +34,28 @@ pub(super) type ConeQuery = QueryState<ConeData, With<GrowthCone>>;
 #[derive(Debug, Clone, Default)]
 pub struct StepStart {
     pub(super) site: Site,
-    pub(super) heading: Vector3<f64>,
-    pub(super) drift: f64,
-    /// What methods of several stages keep besides; made when one of them needs it.
-    stages: Option<Box<Stages>>,
-    pub(super) fault: Option<Box<WalkError>>,
+    heading: Vector2<f64>,
+    /// What few keep besides; made when it is needed.
+    besides: Option<Box<Besides>>,
+}
+
+/// What is kept of a cone by methods of several stages, or once it is lost.
+#[derive(Debug, Clone, Default)]
+struct Besides {
+    stages: Stages,
+    fault: Option<WalkError>,
 }
 
 /// What the stages of an explicit method found.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy)]
 pub(super) struct Stages {
+    /// |v_g| over its nominal value at the start.
+    pub(super) drift: f64,
     /// Material velocity and rate of the velocity vector over v_g, for each stage.
     pub(super) rates: [(Vector3<f64>, Vector3<f64>); STAGES],
     /// Heading before the kick of the first half, and what the first stage found: what a shorter step begins from.
     pub(super) unkicked: Vector3<f64>,
-    pub(super) sampled: SpringState,
+    pub(super) sampled: Spring,
     /// Estimated error of the step (µm), for an embedded pair.
     pub(super) error: f64,
     /// Halvings of the clock's step that the cone takes, and the instant (ticks) it has come to.
@@ -56,27 +63,70 @@ pub(super) struct Stages {
     pub(super) reached: u64,
 }
 
+impl Default for Stages {
+    fn default() -> Self {
+        Self {
+            drift: 1.0,
+            rates: Default::default(),
+            unkicked: Vector3::zeros(),
+            sampled: Spring::heading_along(Vector3::zeros()),
+            error: 0.0,
+            level: 0,
+            reached: 0,
+        }
+    }
+}
+
 impl StepStart {
     /// What several stages keep, made if it is not there yet.
     pub(super) fn stages(&mut self) -> &mut Stages {
-        self.stages.get_or_insert_default()
+        &mut self.besides.get_or_insert_default().stages
     }
 
-    /// Site and spring state before the first stage, with the pull that it found.
-    pub(super) fn taken_back(&mut self) -> (Site, SpringState) {
-        let (site, drift) = (self.site, self.drift);
-        let Stages { unkicked, sampled, .. } = *self.stages();
-        (site, SpringState { heading: unkicked, drift, ..sampled })
+    /// Site and spring before the first stage, with the pull that it found.
+    pub(super) fn taken_back(&mut self) -> (Site, Spring) {
+        let site = self.site;
+        let Stages { unkicked, sampled, drift, .. } = *self.stages();
+        (site, Spring { heading: unkicked, drift, ..sampled })
     }
 
-    /// What the stages so far found; nothing before the first.
-    pub(super) fn rates(&self) -> &[(Vector3<f64>, Vector3<f64>)] {
-        self.stages.as_deref().map_or(&[], |stages| &stages.rates)
+    /// What the stages so far found.
+    pub(super) fn rates(&mut self) -> &[(Vector3<f64>, Vector3<f64>)] {
+        &self.stages().rates
+    }
+
+    /// Unit heading at the start.
+    pub(super) fn heading(&self) -> Vector3<f64> {
+        lift(self.heading.into())
+    }
+
+    /// Sets the unit heading at the start.
+    pub(super) fn set_heading(&mut self, heading: Vector3<f64>) {
+        self.heading = heading.xy();
     }
 
     /// Begins a step; what the stages of the one before found is no longer looked at.
-    pub(super) fn begin(&mut self, site: Site, heading: Vector3<f64>, drift: f64) {
-        (self.site, self.heading, self.drift, self.fault) = (site, heading, drift, None);
+    pub(super) fn begin(&mut self, site: Site, heading: Vector3<f64>) {
+        self.site = site;
+        self.set_heading(heading);
+        self.forgive();
+    }
+
+    /// Why the cone was lost, if it was.
+    pub(super) fn fault(&self) -> Option<&WalkError> {
+        self.besides.as_ref()?.fault.as_ref()
+    }
+
+    /// Notes that the cone was lost.
+    pub(super) fn blame(&mut self, fault: WalkError) {
+        self.besides.get_or_insert_default().fault = Some(fault);
+    }
+
+    /// Forgets that it was.
+    pub(super) fn forgive(&mut self) {
+        if let Some(besides) = &mut self.besides {
+            besides.fault = None;
+        }
     }
 }
 
@@ -87,7 +137,7 @@ pub(super) struct Mover<'a> {
     pub(super) site: &'a mut Site,
     pub(super) position: &'a mut Position,
     pub(super) velocity: &'a mut Velocity,
-    pub(super) spring: &'a mut SpringState,
+    pub(super) spring: &'a mut Spring,
     pub(super) journey: &'a mut Journey,
     pub(super) start: &'a mut StepStart,
 }
@@ -126,9 +176,9 @@ impl Step<'_> {
             &nowhere(BorderRule::Slide),
         ) {
             Ok(walked) => *mover.site = walked.point.into(),
-            Err(fault) => mover.start.fault = Some(fault.into()),
+            Err(fault) => mover.start.blame(fault),
         }
-        mover.position.0 = self.configuration.position(&self.tissue.mesh, *mover.site);
+        mover.position.0 = self.configuration.position(&self.tissue.mesh, *mover.site).xy();
     }
 
     /// Heading after the Brownian increment over a span of ticks: dθ = √(2 D_θ) dW.
@@ -172,7 +222,7 @@ impl Step<'_> {
             Ok(walked) => self.settle(mover, walked, length),
             Err(fault) => {
                 *mover.site = from;
-                mover.start.fault = Some(fault.into());
+                mover.start.blame(fault);
             }
         }
     }
@@ -193,7 +243,7 @@ impl Step<'_> {
         mover.journey.length += length * walked.travelled;
         mover.journey.worst_drift = mover.journey.worst_drift.max((mover.spring.drift - 1.0).abs());
         let spring = &*mover.spring;
-        mover.velocity.growth = spring.heading * (mover.cone.speed * spring.speed_factor * spring.drift);
+        mover.velocity.growth = spring.heading.xy() * (mover.cone.speed * spring.speed_factor * spring.drift);
     }
 }
 
@@ -243,7 +293,9 @@ pub(super) fn each_growing(
                     .with_min_len(CHUNK)
                     .filter(|(_, status, ..)| **status == Status::Growing)
                     .for_each(|(cone, status, site, position, velocity, spring, journey, start)| {
-                        act(&step, &mut Mover { cone, status, site, position, velocity, spring, journey, start });
+                        spring.change(|spring| {
+                            act(&step, &mut Mover { cone, status, site, position, velocity, spring, journey, start });
+                        });
                     });
             }
         });

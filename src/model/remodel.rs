@@ -11,7 +11,7 @@ use crate::kept;
 use crate::numerics::walk::{BorderRule, nowhere, walk};
 use bevy_ecs::prelude::{Query, Res, ResMut, Resource, With};
 use bevy_ecs::system::SystemParam;
-use nalgebra::Vector3;
+use nalgebra::{Vector2, Vector3};
 
 /// Growth cones that wait for branches: a fixed number for each axon, so that what one axon does takes nothing from another.
 ///
@@ -147,7 +147,7 @@ impl Remodelling<'_, '_> {
             identity: *identity,
             status: *status,
             site: *site,
-            heading: spring.heading,
+            heading: spring.seen().heading,
         };
         self.cones
             .iter()
@@ -204,7 +204,7 @@ impl Remodelling<'_, '_> {
         let (now, hours, position) = (self.clock.now, self.clock.hours(), self.position(site));
         let at = self.tissue.reference_position(site);
         self.change(number, |identity, cone| {
-            (identity.birth, identity.birth_time) = (now, hours);
+            identity.birth = now;
             cone.begin((site, position), heading, identity.speed, hours);
         });
         self.shafts.start(number as usize, site, [at.x, at.y], hours);
@@ -212,7 +212,7 @@ impl Remodelling<'_, '_> {
 
     /// Turns the heading of a cone.
     pub fn head(&mut self, cone: u32, heading: Vector3<f64>) {
-        self.change(cone, |_, cone| cone.spring.heading = heading);
+        self.change(cone, |_, cone| cone.spring.change(|spring| spring.heading = heading));
     }
 
     /// Says what a cone is doing from now on.
@@ -318,9 +318,9 @@ impl Remodelling<'_, '_> {
         self.relay(cone, kept, &[], ShaftPoint { site, time });
         let position = self.position(site);
         self.change(cone, |_, cone| {
-            (*cone.site, cone.position.0) = (site, position);
-            cone.velocity.growth = Vector3::zeros();
-            cone.spring.heading = heading.unwrap_or(cone.spring.heading);
+            (*cone.site, cone.position.0) = (site, position.xy());
+            cone.velocity.growth = Vector2::zeros();
+            cone.spring.change(|spring| spring.heading = heading.unwrap_or(spring.heading));
         });
     }
 }

@@ -23,7 +23,8 @@ pub fn settle(
             continue;
         }
         let at = tissue.reference_position(*site);
-        position.0 = configuration.position(&tissue.mesh, *site);
+        position.0 = configuration.position(&tissue.mesh, *site).xy();
+        let spring = spring.seen();
         if !(spring.is_finite() && position.0.sum().is_finite() && at.sum().is_finite()) {
             health.report(
                 time,
@@ -43,6 +44,6 @@ pub fn settle(
             );
             return;
         }
-        shafts.extend(shaft, *site, [at.x, at.y], time);
+        shafts.extend(shaft, (*site, [at.x, at.y]), time, |before| tissue.reference_position(before).xy().into());
     }
 }

@@ -31,16 +31,32 @@ pub enum Successor {
     Tip(u32),
 }
 
+/// The head of a shaft: its first and last block, its tip in pieces that leave no gaps, and what may follow it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Chain {
     first: u32,
     last: u32,
-    tip: Site,
+    tip_cell: u32,
     tip_time: f32,
+    tip_weights: [f64; 2],
     end: OpenEnd,
 }
 
-kept! { struct Chain { first, last, tip, tip_time, end } }
+kept! { struct Chain { first, last, tip_cell, tip_time, tip_weights, end } }
+
+impl Chain {
+    /// Of a shaft that has not begun.
+    const EMPTY: Self =
+        Self { first: NONE, last: NONE, tip_cell: 0, tip_time: 0.0, tip_weights: [0.0; 2], end: OpenEnd::NONE };
+
+    fn tip(&self) -> Site {
+        Site { cell: self.tip_cell, weights: self.tip_weights }
+    }
+
+    fn put_tip(&mut self, site: Site, time: f32) {
+        (self.tip_cell, self.tip_weights, self.tip_time) = (site.cell, site.weights, time);
+    }
+}
 
 /// The bit of a vertex among those of its block.
 fn bit(vertex: VertexId) -> u16 {
@@ -88,12 +104,11 @@ kept! { struct ShaftPoint { site, time } }
 impl Shafts {
     /// `count` shafts without a point. `tolerance` and `longest` in µm.
     pub fn new(count: usize, tolerance: f64, longest: f64) -> Self {
-        let empty = Chain { first: NONE, last: NONE, tip: Site::default(), tip_time: 0.0, end: OpenEnd::default() };
         Self {
             tolerance,
             longest,
             blocks: Blocks::new(count),
-            chains: vec![empty; count],
+            chains: vec![Chain::EMPTY; count],
             watched: false,
             laid: Vec::new(),
             struck: Vec::new(),
@@ -153,22 +168,25 @@ impl Shafts {
     pub fn start(&mut self, shaft: usize, site: Site, at: [f64; 2], time: f64) {
         self.push(shaft, site, time as f32);
         let chain = &mut self.chains[shaft];
-        chain.tip = site;
-        chain.tip_time = time as f32;
+        chain.put_tip(site, time as f32);
         chain.end = OpenEnd::at(at);
     }
 
-    /// Moves the tip of a shaft on to a site with reference position `at`; stores the former tip when the chord to the
-    /// new one would leave the tolerance or grow too long.
-    pub fn extend(&mut self, shaft: usize, site: Site, at: [f64; 2], time: f64) {
-        let Chain { tip, tip_time, end, .. } = self.chains[shaft];
-        self.chains[shaft].end = end.widened(at, self.tolerance, self.longest).unwrap_or_else(|| {
-            self.push(shaft, tip, tip_time);
-            OpenEnd::chord(end.tip, at, self.tolerance, self.longest)
+    /// Moves the tip of a shaft on to a site whose reference position is `at` (µm); stores the former tip when the chord to the
+    /// new one would leave the tolerance or grow too long. `reference` is asked for the reference position of the former one then.
+    pub fn extend(
+        &mut self,
+        shaft: usize,
+        (site, at): (Site, [f64; 2]),
+        time: f64,
+        reference: impl FnOnce(Site) -> [f64; 2],
+    ) {
+        let chain = self.chains[shaft];
+        self.chains[shaft].end = chain.end.widened(at, self.tolerance, self.longest).unwrap_or_else(|| {
+            self.push(shaft, chain.tip(), chain.tip_time);
+            OpenEnd::chord(reference(chain.tip()), at, self.tolerance, self.longest)
         });
-        let chain = &mut self.chains[shaft];
-        chain.tip = site;
-        chain.tip_time = time as f32;
+        self.chains[shaft].put_tip(site, time as f32);
     }
 
     fn push(&mut self, shaft: usize, site: Site, time: f32) {
@@ -242,8 +260,7 @@ impl Shafts {
         for point in points {
             self.push(shaft, point.site, point.time);
         }
-        let chain = &mut self.chains[shaft];
-        (chain.tip, chain.tip_time) = (tip.site, tip.time);
+        self.chains[shaft].put_tip(tip.site, tip.time);
     }
 
     /// Begins the open end of a shaft anew, from the reference position of its last stored vertex to that of its tip (µm).
@@ -311,7 +328,7 @@ impl Shafts {
     /// The tip of a shaft as it was at the end of the last step.
     #[inline]
     pub fn tip(&self, shaft: u32) -> MaterialPoint<2> {
-        self.chains[shaft as usize].tip.planar()
+        self.chains[shaft as usize].tip().planar()
     }
 
     /// Time (h) at which the cone came to where its tip is, the first time.
@@ -359,7 +376,7 @@ mod tests {
 
     /// One cell (0,0), (1,0), (0,1): weights are reference coordinates.
     fn site(at: [f64; 2]) -> Site {
-        Site { cell: 0, weights: [at[0], at[1], 0.0] }
+        Site { cell: 0, weights: at }
     }
 
     fn distance_to_polyline(point: [f64; 2], line: &[[f64; 2]]) -> f64 {
@@ -376,7 +393,7 @@ mod tests {
         let mut shafts = Shafts::new(2, tolerance, longest);
         shafts.start(1, site(path[0]), path[0], 0.0);
         for (i, &at) in path.iter().enumerate().skip(1) {
-            shafts.extend(1, site(at), at, i as f64);
+            shafts.extend(1, (site(at), at), i as f64, |before| before.weights);
         }
         shafts.polyline(1).iter().map(|p| p.weights).collect()
     }
@@ -424,7 +441,7 @@ mod tests {
                 let point = at(shaft, i);
                 match i {
                     0 => shafts.start(shaft, site(point), point, 0.0),
-                    _ => shafts.extend(shaft, site(point), point, i as f64),
+                    _ => shafts.extend(shaft, (site(point), point), i as f64, |before| before.weights),
                 }
             }
         }
@@ -446,7 +463,7 @@ mod tests {
         shafts.watch();
         let at = |i: usize| [i as f64, (i as f64).sin()];
         shafts.start(0, site(at(0)), at(0), 0.0);
-        (1..=40).for_each(|i| shafts.extend(0, site(at(i)), at(i), i as f64));
+        (1..=40).for_each(|i| shafts.extend(0, (site(at(i)), at(i)), i as f64, |before| before.weights));
         assert_eq!(shafts.take_laid().len(), 40);
         let point = |i: usize| ShaftPoint { site: site(at(i)), time: i as f32 };
         shafts.lay_anew(0, 10, &[point(50), point(51)], point(52));
@@ -458,10 +475,15 @@ mod tests {
         let expected: Vec<_> = (0..10).chain(50..53).map(at).collect();
         assert_eq!(line, expected);
         // What nobody has heard of yet goes without a word; the first vertex stays.
-        shafts.extend(0, site(at(60)), at(60), 60.0);
+        shafts.extend(0, (site(at(60)), at(60)), 60.0, |before| before.weights);
         shafts.lay_anew(0, 12, &[], point(5));
         assert!(shafts.take_struck().is_empty() && shafts.take_laid().is_empty());
         shafts.lay_anew(0, 0, &[], point(0));
         assert_eq!((shafts.polyline(0).len(), shafts.vertex_count(), shafts.tip_time(0)), (2, 1, 0.0));
+    }
+
+    #[test]
+    fn the_head_of_a_shaft_takes_88_bytes() {
+        assert_eq!(size_of::<Chain>(), 88);
     }
 }

@@ -116,7 +116,7 @@ mod tests {
         let mut world = World::new();
         world.insert_resource(Clock { now, ..Clock::new(TimeGrid::new(0.1).unwrap(), 1 << 40) });
         for (axon, (birth, status)) in (0..).zip(cones) {
-            world.spawn((GrowthCone { axon, population: 0, speed: 1.0, birth, birth_time: 0.0 }, status));
+            world.spawn((GrowthCone { axon, population: 0, speed: 1.0, birth }, status));
         }
         world
     }

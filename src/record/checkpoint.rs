@@ -15,7 +15,7 @@ use std::path::{Path, PathBuf};
 pub const NAMES: [&str; 2] = ["checkpoint.bin", "checkpoint.previous.bin"];
 const MAGIC: &[u8; 8] = b"tropckpt";
 /// Raised whenever what stands in the body, or its order, changes.
-const FORMAT: u32 = 5;
+const FORMAT: u32 = 6;
 const HEADER: usize = 24;
 const PROGRAM: &str = env!("CARGO_PKG_VERSION");
 

@@ -66,25 +66,38 @@ impl Height {
     }
 }
 
-/// Measures dispersion and bundling of the shafts (each origin → tip, µm) at a height, with linkage distance `linkage`
-/// in µm (the reach of a filopodium, 10 µm, is natural). `populations` has the population of each shaft.
-pub fn measure_at_height(
-    shafts: &[Vec<[f64; 2]>],
-    populations: &[u16],
+/// The shafts that cross a height.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Crossings {
     height: Height,
-    linkage: f64,
-) -> HeightMeasures {
-    let crossing = |(shaft, kind): (&Vec<[f64; 2]>, &u16)| first_crossing(shaft, height.y()).map(|x| (x, *kind));
-    let crossings: Vec<(f64, u16)> = shafts.iter().zip(populations).filter_map(crossing).collect();
-    let positions: Vec<f64> = crossings.iter().map(|(x, _)| *x).collect();
-    HeightMeasures {
-        share: height.share,
-        y_um: height.y(),
-        crossing: positions.len(),
-        mean_x_um: statistics::mean(&positions),
-        spread_um: statistics::standard_deviation(&positions),
-        like_neighbours: like_neighbours(crossings),
-        fascicles: find_fascicles(&positions, linkage),
+    /// x (µm) of each, and its population.
+    found: Vec<(f64, u16)>,
+}
+
+impl Crossings {
+    /// None yet.
+    pub fn new(height: Height) -> Self {
+        Self { height, found: Vec::new() }
+    }
+
+    /// Looks at a shaft (origin → tip, µm) of a population.
+    pub fn add(&mut self, shaft: &[[f64; 2]], population: u16) {
+        self.found.extend(first_crossing(shaft, self.height.y()).map(|x| (x, population)));
+    }
+
+    /// Dispersion and bundling of the shafts that cross, with linkage distance `linkage` in µm (the reach of a filopodium, 10 µm, is
+    /// natural).
+    pub fn measure(self, linkage: f64) -> HeightMeasures {
+        let positions: Vec<f64> = self.found.iter().map(|(x, _)| *x).collect();
+        HeightMeasures {
+            share: self.height.share,
+            y_um: self.height.y(),
+            crossing: positions.len(),
+            mean_x_um: statistics::mean(&positions),
+            spread_um: statistics::standard_deviation(&positions),
+            like_neighbours: like_neighbours(self.found),
+            fascicles: find_fascicles(&positions, linkage),
+        }
     }
 }
 
@@ -154,6 +167,12 @@ mod tests {
         positions.iter().map(|&x| vec![[x, 0.0], [x, 100.0]]).collect()
     }
 
+    fn measured(shafts: &[Vec<[f64; 2]>], populations: &[u16], height: Height) -> HeightMeasures {
+        let mut crossings = Crossings::new(height);
+        shafts.iter().zip(populations).for_each(|(shaft, population)| crossings.add(shaft, *population));
+        crossings.measure(10.0)
+    }
+
     #[test]
     fn clusters_on_known_positions_have_the_known_sizes() {
         // Gaps: 4, 5 | 30 | 30, 5 (inclusive) …: clusters of 3, 1 and 2.
@@ -179,7 +198,7 @@ mod tests {
         let (count, step) = (21, 7.0);
         let shafts = upright(&(0..count).map(|i| step * f64::from(i)).collect::<Vec<_>>());
         let height = Height { share: 0.75, y_min: -20.0, y_max: 120.0 };
-        let measures = measure_at_height(&shafts, &vec![0; shafts.len()], height, 10.0);
+        let measures = measured(&shafts, &vec![0; shafts.len()], height);
         assert_eq!(measures.y_um, 85.0);
         assert_eq!(measures.crossing, 21);
         assert!((measures.mean_x_um.unwrap() - 70.0).abs() < 1e-12);
@@ -192,7 +211,7 @@ mod tests {
     fn neighbours_are_like_where_populations_are_sorted_and_unlike_where_they_alternate() {
         let shafts = upright(&[0.0, 3.0, 7.0, 50.0, 52.0]);
         let height = Height { share: 0.5, y_min: 0.0, y_max: 100.0 };
-        let like = |kinds: [u16; 5]| measure_at_height(&shafts, &kinds, height, 10.0).like_neighbours;
+        let like = |kinds: [u16; 5]| measured(&shafts, &kinds, height).like_neighbours;
         assert_eq!(like([0, 0, 0, 1, 1]), Some(1.0));
         assert_eq!(like([0, 1, 0, 1, 0]), Some(0.0));
         assert_eq!(like([0, 0, 1, 0, 1]), Some(0.4));
@@ -214,7 +233,7 @@ mod tests {
     fn nobody_on_the_line_leaves_everything_unsaid() {
         let height = Height { share: 0.5, y_min: 0.0, y_max: 600.0 };
         for shafts in [vec![], vec![vec![]], upright(&[3.0])] {
-            let measures = measure_at_height(&shafts, &vec![0; shafts.len()], height, 10.0);
+            let measures = measured(&shafts, &vec![0; shafts.len()], height);
             assert_eq!((measures.crossing, measures.spread_um, measures.mean_x_um), (0, None, None));
             let json = serde_json::to_value(&measures).unwrap();
             assert!(json["fascicles"]["largest_fraction"].is_null());

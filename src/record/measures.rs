@@ -1,10 +1,10 @@
 //! Morphology of a whole run: arrivals, path shape, turning, dispersion and fascicles.
 //!
-//! One [`AxonRecord`] an axon or branch goes in, one [`Morphology`] comes out. A measure that has no axons to speak of is `None`
+//! One [`AxonRecord`] an axon or branch goes into a [`Tally`], which keeps no path, one [`Morphology`] comes out. A measure that has no axons to speak of is `None`
 //! (JSON `null`); no measure is ever NaN. Angles are radians inside and degrees in what is reported (the field's name
 //! says so), positive counter-clockwise.
 
-use super::fascicles::{Height, HeightMeasures, measure_at_height};
+use super::fascicles::{Crossings, Height, HeightMeasures};
 use super::statistics::Distribution;
 use serde::Serialize;
 
@@ -80,32 +80,77 @@ pub struct Morphology {
     pub heights: Vec<HeightMeasures>,
 }
 
-/// Measures the axons born so far.
-pub fn measure(axons: &[AxonRecord], options: &MeasureOptions) -> Morphology {
-    let all: Vec<&AxonRecord> = axons.iter().collect();
-    let trunks: Vec<&AxonRecord> = axons.iter().filter(|axon| !axon.is_branch).collect();
-    let (early, late) = split_birth_window(&trunks);
-    let shafts: Vec<Vec<[f64; 2]>> = axons.iter().map(|axon| axon.shaft.clone()).collect();
-    let populations: Vec<u16> = axons.iter().map(|axon| axon.population).collect();
-    let height = |&share: &f64| {
-        let height = Height { share, y_min: options.y_min, y_max: options.y_max };
-        measure_at_height(&shafts, &populations, height, options.linkage)
-    };
-    Morphology {
-        hits: count_hits(&trunks),
-        hits_early: count_hits(&early),
-        hits_late: count_hits(&late),
-        travel_time_h: distribution(&trunks, |axon| Some(axon.arrival_time? - axon.birth_time)),
-        length_um: distribution(&all, |axon| Some(path_length(&axon.shaft)).filter(|_| !axon.is_withdrawn)),
-        straightness: distribution(&all, |axon| straightness(&axon.shaft)),
-        turning_angle_deg: distribution(&trunks, |axon| {
-            turning_angle(axon.initial_heading, &axon.shaft).map(f64::to_degrees)
-        }),
-        heading_turn_deg: distribution(&trunks, |axon| {
-            signed_angle(axon.initial_heading, axon.final_heading).map(f64::to_degrees)
-        }),
-        heights: options.shares.iter().map(height).collect(),
+/// When an axon was born, and when it arrived (h).
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Trunk {
+    birth_time: f64,
+    arrival_time: Option<f64>,
+}
+
+/// Measures of axons, one after the other.
+#[derive(Debug, Clone)]
+pub struct Tally {
+    linkage: f64,
+    trunks: Vec<Trunk>,
+    lengths: Vec<f64>,
+    straightnesses: Vec<f64>,
+    turning_angles: Vec<f64>,
+    heading_turns: Vec<f64>,
+    crossings: Vec<Crossings>,
+}
+
+impl Tally {
+    /// Of no axon yet.
+    pub fn new(options: &MeasureOptions) -> Self {
+        let height = |&share: &f64| Height { share, y_min: options.y_min, y_max: options.y_max };
+        Self {
+            linkage: options.linkage,
+            trunks: Vec::new(),
+            lengths: Vec::new(),
+            straightnesses: Vec::new(),
+            turning_angles: Vec::new(),
+            heading_turns: Vec::new(),
+            crossings: options.shares.iter().map(|share| Crossings::new(height(share))).collect(),
+        }
     }
+
+    /// Looks at an axon.
+    pub fn add(&mut self, axon: &AxonRecord) {
+        self.lengths.extend(finite(Some(path_length(&axon.shaft)).filter(|_| !axon.is_withdrawn)));
+        self.straightnesses.extend(finite(straightness(&axon.shaft)));
+        self.crossings.iter_mut().for_each(|crossings| crossings.add(&axon.shaft, axon.population));
+        if axon.is_branch {
+            return;
+        }
+        let turning = turning_angle(axon.initial_heading, &axon.shaft);
+        self.turning_angles.extend(finite(turning.map(f64::to_degrees)));
+        let turn = signed_angle(axon.initial_heading, axon.final_heading);
+        self.heading_turns.extend(finite(turn.map(f64::to_degrees)));
+        self.trunks.push(Trunk { birth_time: axon.birth_time, arrival_time: axon.arrival_time });
+    }
+
+    /// The measures of the axons looked at.
+    pub fn measure(self) -> Morphology {
+        let (early, late) = split_birth_window(&self.trunks);
+        let travel = |trunk: &Trunk| finite(trunk.arrival_time.map(|arrival| arrival - trunk.birth_time));
+        let travel_times: Vec<f64> = self.trunks.iter().filter_map(travel).collect();
+        Morphology {
+            hits: count_hits(&self.trunks),
+            hits_early: count_hits(&early),
+            hits_late: count_hits(&late),
+            travel_time_h: Distribution::of(&travel_times),
+            length_um: Distribution::of(&self.lengths),
+            straightness: Distribution::of(&self.straightnesses),
+            turning_angle_deg: Distribution::of(&self.turning_angles),
+            heading_turn_deg: Distribution::of(&self.heading_turns),
+            heights: self.crossings.into_iter().map(|crossings| crossings.measure(self.linkage)).collect(),
+        }
+    }
+}
+
+/// A value, if there is one and it is finite.
+fn finite(value: Option<f64>) -> Option<f64> {
+    value.filter(|value| value.is_finite())
 }
 
 /// Length of a polyline, Σ|x_{i+1} − x_i|, in µm; 0 for fewer than two points.
@@ -141,20 +186,14 @@ fn chord(path: &[[f64; 2]]) -> Option<[f64; 2]> {
     Some([end[0] - start[0], end[1] - start[1]])
 }
 
-/// Describes a quantity over the axons that have one; values that are not finite are left out.
-fn distribution(axons: &[&AxonRecord], quantity: impl Fn(&AxonRecord) -> Option<f64>) -> Option<Distribution> {
-    let values: Vec<f64> = axons.iter().filter_map(|axon| quantity(axon)).filter(|value| value.is_finite()).collect();
-    Distribution::of(&values)
-}
-
 /// Counts arrivals.
-fn count_hits(axons: &[&AxonRecord]) -> Hits {
+fn count_hits(axons: &[Trunk]) -> Hits {
     let (born, arrived) = (axons.len(), axons.iter().filter(|axon| axon.arrival_time.is_some()).count());
     Hits { born, arrived, fraction: (born > 0).then(|| arrived as f64 / born as f64) }
 }
 
 /// The axons born before the middle of the birth window, and the others; two empty lists if the window has no length.
-fn split_birth_window<'a>(axons: &[&'a AxonRecord]) -> (Vec<&'a AxonRecord>, Vec<&'a AxonRecord>) {
+fn split_birth_window(axons: &[Trunk]) -> (Vec<Trunk>, Vec<Trunk>) {
     let times = || axons.iter().map(|axon| axon.birth_time);
     match (times().reduce(f64::min), times().reduce(f64::max)) {
         (Some(first), Some(last)) if first < last => {
@@ -182,6 +221,12 @@ mod tests {
             initial_heading: [0.0, 1.0],
             final_heading: end,
         }
+    }
+
+    fn measure(axons: &[AxonRecord], options: &MeasureOptions) -> Morphology {
+        let mut tally = Tally::new(options);
+        axons.iter().for_each(|axon| tally.add(axon));
+        tally.measure()
     }
 
     fn options() -> MeasureOptions {

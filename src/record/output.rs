@@ -2,7 +2,7 @@
 
 use std::ffi::OsString;
 use std::fs::{self, File};
-use std::io::{self, Write};
+use std::io::{self, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
 /// An output file could not be written.
@@ -57,7 +57,7 @@ pub fn write_unsynced(path: &Path, contents: &[u8]) -> Result<(), WriteError> {
 /// A fresh file under a temporary name. What a run that was killed, or a link that somebody laid, left there goes: it is not written through.
 fn begun_anew(temporary: &Path) -> io::Result<File> {
     remove_if_there(temporary).map_err(|error| error.source)?;
-    File::create_new(temporary)
+    File::options().read(true).write(true).create_new(true).open(temporary)
 }
 
 /// A file that grows under a temporary name beside its own, and takes that only when it is complete.
@@ -66,6 +66,8 @@ pub struct Partial {
     path: PathBuf,
     temporary: PathBuf,
     file: Option<File>,
+    /// Bytes appended so far.
+    length: u64,
 }
 
 impl Partial {
@@ -77,16 +79,22 @@ impl Partial {
         let temporary = temporary_beside(path);
         let file = make_parent(path).and_then(|()| begun_anew(&temporary));
         let file = file.map_err(|source| WriteError { path: path.to_owned(), source })?;
-        Ok(Self { path: path.to_owned(), temporary, file: Some(file) })
+        Ok(Self { path: path.to_owned(), temporary, file: Some(file), length: 0 })
     }
 
     /// Appends bytes.
     ///
     /// # Errors
-    /// The path and the system's reason.
+    /// The path and the system's reason; nothing is appended then.
     pub fn write(&mut self, bytes: &[u8]) -> Result<(), WriteError> {
-        let written = self.file.as_mut().map_or(Ok(()), |file| file.write_all(bytes));
-        written.map_err(|source| WriteError { path: self.path.clone(), source })
+        let Some(file) = &mut self.file else { return Ok(()) };
+        let end = self.length;
+        let written = file.write_all(bytes).inspect_err(|_| {
+            // A part of them that is there all the same: what cannot be cut off is written over.
+            let _ = file.set_len(end).and_then(|()| file.seek(SeekFrom::Start(end)));
+        });
+        self.length += if written.is_ok() { bytes.len() as u64 } else { 0 };
+        written.map_err(|source| self.error(source))
     }
 
     /// What has been appended so far.
@@ -94,19 +102,31 @@ impl Partial {
     /// # Errors
     /// The path and the system's reason.
     pub fn contents(&self) -> Result<Vec<u8>, WriteError> {
-        fs::read(&self.temporary).map_err(|source| WriteError { path: self.path.clone(), source })
+        let read = |mut file: &File| {
+            let mut bytes = Vec::new();
+            file.seek(SeekFrom::Start(0))?;
+            file.take(self.length).read_to_end(&mut bytes)?;
+            file.seek(SeekFrom::Start(self.length)).map(|_| bytes)
+        };
+        self.file.as_ref().map_or(Ok(Vec::new()), read).map_err(|source| self.error(source))
     }
 
-    /// Gives the file its name.
+    /// Gives the file its name. Where its folder has gone meanwhile, it is written again.
     ///
     /// # Errors
     /// The path and the system's reason.
     pub fn commit(mut self) -> Result<(), WriteError> {
         let synced = self.file.as_ref().map_or(Ok(()), File::sync_all);
-        let named = synced.and_then(|()| fs::rename(&self.temporary, &self.path));
-        named.map_err(|source| WriteError { path: self.path.clone(), source })?;
+        match synced.and_then(|()| fs::rename(&self.temporary, &self.path)) {
+            Err(error) if error.kind() == io::ErrorKind::NotFound => write_atomically(&self.path, &self.contents()?)?,
+            named => named.map_err(|source| self.error(source))?,
+        }
         self.file = None;
         Ok(())
+    }
+
+    fn error(&self, source: io::Error) -> WriteError {
+        WriteError { path: self.path.clone(), source }
     }
 }
 
@@ -284,6 +304,21 @@ mod tests {
         write_atomically(&path, b"a longer first version").unwrap();
         write_atomically(&path, b"second").unwrap();
         assert_eq!(fs::read(&path).unwrap(), b"second");
+        assert_eq!(fs::read_dir(path.parent().unwrap()).unwrap().count(), 1);
+        fs::remove_dir_all(folder).unwrap();
+    }
+
+    #[test]
+    fn a_file_that_grows_is_written_again_where_its_folder_has_gone() {
+        let folder = folder("gone");
+        let path = folder.join("deeper/table.csv");
+        let mut partial = Partial::create(&path).unwrap();
+        partial.write(b"first, ").unwrap();
+        fs::remove_dir_all(&folder).unwrap();
+        assert_eq!(partial.contents().unwrap(), b"first, ");
+        partial.write(b"second").unwrap();
+        partial.commit().unwrap();
+        assert_eq!(fs::read(&path).unwrap(), b"first, second");
         assert_eq!(fs::read_dir(path.parent().unwrap()).unwrap().count(), 1);
         fs::remove_dir_all(folder).unwrap();
     }

@@ -121,13 +121,16 @@ impl Snapshot {
 
 /// Shafts of all axons born (µm), in the order of the cones.
 pub fn shafts(world: &World) -> Vec<Vec<[f64; 2]>> {
+    let lines = (0..world.resource::<Shafts>().count()).map(shaft_lines(world));
+    lines.filter(|line| !line.is_empty()).collect()
+}
+
+/// The shaft of a cone (µm), origin to tip; empty before birth.
+fn shaft_lines(world: &World) -> impl Fn(usize) -> Vec<[f64; 2]> + '_ {
     let (tissue, configuration) = (world.resource::<Tissue>(), world.resource::<Configuration>());
     let shafts = world.resource::<Shafts>();
-    let place = |point: crate::numerics::locate::MaterialPoint<2>| configuration.place(&tissue.mesh, point);
-    (0..shafts.count())
-        .map(|shaft| shafts.polyline(shaft).into_iter().map(place).collect::<Vec<_>>())
-        .filter(|line| !line.is_empty())
-        .collect()
+    let place = |point| configuration.place(&tissue.mesh, point);
+    move |shaft| shafts.polyline(shaft).into_iter().map(place).collect()
 }
 
 /// Tips of all axons born, in the order of the cones.
@@ -143,7 +146,7 @@ pub fn tips(world: &World) -> Vec<TipView> {
         .filter(|(_, status, ..)| **status != Status::Unborn)
         .map(|(cone, status, site, spring)| {
             let x = configuration.position(&tissue.mesh, *site);
-            let heading = [spring.heading.x, spring.heading.y];
+            let heading = spring.heading().into();
             let is_branch = spares.is_branch(cone.axon);
             TipView { axon: cone.axon, position: [x.x, x.y], heading, status: *status, is_branch }
         })
@@ -164,27 +167,28 @@ pub fn arrivals(world: &World) -> BTreeMap<u32, f64> {
     arrivals
 }
 
-/// What measures need of every axon born.
-pub fn axon_records(world: &World) -> Vec<AxonRecord> {
+/// Calls `act` with what measures need of every axon born, in the order of the cones.
+pub fn each_axon(world: &World, mut act: impl FnMut(AxonRecord)) {
     let Some(mut cones) =
         world.try_query_filtered::<(&GrowthCone, &Status, &Journey, &SpringState), With<GrowthCone>>()
     else {
-        return Vec::new();
+        return;
     };
-    let (spares, arrivals) = (world.resource::<SpareCones>(), arrivals(world));
-    let born = cones.iter(world).filter(|(_, status, ..)| **status != Status::Unborn);
-    born.zip(shafts(world))
-        .map(|((cone, status, journey, spring), shaft)| AxonRecord {
+    let (spares, grid) = (world.resource::<SpareCones>(), &world.resource::<Clock>().grid);
+    let (arrivals, line) = (arrivals(world), shaft_lines(world));
+    let born = cones.iter(world).enumerate().filter(|(_, (_, status, ..))| **status != Status::Unborn);
+    for (shaft, (cone, status, journey, spring)) in born {
+        act(AxonRecord {
             population: cone.population,
-            shaft,
-            birth_time: cone.birth_time,
+            shaft: line(shaft),
+            birth_time: cone.birth_time(grid),
             arrival_time: arrivals.get(&cone.axon).copied(),
             is_branch: spares.is_branch(cone.axon),
             is_withdrawn: *status == Status::Withdrawn,
-            initial_heading: [journey.first_heading[0], journey.first_heading[1]],
-            final_heading: [spring.heading.x, spring.heading.y],
-        })
-        .collect()
+            initial_heading: journey.first_heading,
+            final_heading: spring.heading().into(),
+        });
+    }
 }
 
 fn fields(world: &World) -> Vec<FieldView> {

@@ -1,7 +1,7 @@
 //! `summary.json`: what came out, and what it cost.
 
-use super::measures::{MeasureOptions, Morphology, measure};
-use super::snapshot::{arrivals, axon_records, extent_in_y, tips};
+use super::measures::{MeasureOptions, Morphology, Tally};
+use super::snapshot::{arrivals, each_axon, extent_in_y, tips};
 use crate::model::clock::Clock;
 use crate::model::components::{GrowthCone, Journey, Status};
 use crate::model::configuration::Configuration;
@@ -155,7 +155,9 @@ impl Summary {
 
 /// The morphology; without targets there is no hit fraction.
 pub fn morphology(world: &World, options: &MeasureOptions) -> Morphology {
-    let mut found = measure(&axon_records(world), options);
+    let mut tally = Tally::new(options);
+    each_axon(world, |axon| tally.add(&axon));
+    let mut found = tally.measure();
     if world.resource::<Targets>().cells.is_empty() {
         for hits in [&mut found.hits, &mut found.hits_early, &mut found.hits_late] {
             hits.fraction = None;

@@ -92,9 +92,8 @@ pub(super) fn assemble(loaded: &Loaded, roster: &Roster, shelf: &Shelf) -> Resul
     world.insert_resource(RightHandSide(schedules.right_hand_side));
     bring_tissue_to(&mut world, 0.0);
     loaded.remarks.iter().for_each(|remark| world.resource_mut::<Health>().note(remark.clone()));
-    let births = populate::births_in_order(&mut world);
     world.resource_mut::<Stopwatch>().lap("assembly");
-    Ok(Simulation { world, step: schedules.step, births, next_birth: 0 })
+    Ok(Simulation { world, step: schedules.step })
 }
 
 /// Reads the blocks in the roster's order and lets each check itself against the scene.
@@ -316,7 +315,7 @@ fn plan(world: &mut World, loaded: &Loaded, roster: &Roster) {
     let mesh = (tissue.mesh.bytes() + configuration) as f64;
     let mut plan = world.resource_mut::<Plan>();
     plan.hold("mesh", mesh, Each::Run);
-    plan.hold("axons", populate::BYTES_AN_AXON as f64 + Shafts::bytes_a_shaft(), Each::Axon);
+    plan.hold("axons", populate::BYTES_A_CONE as f64 + Shafts::bytes_a_shaft(), Each::Axon);
     plan.hold("shafts", Shafts::bytes_a_vertex(), Each::ShaftVertex);
     for entry in roster.entries.iter().filter(|entry| !loaded.blocks.contains_key(entry.name)) {
         plan.leave_out(entry.name, "the scene has no such block");

@@ -7,9 +7,10 @@ mod assemble;
 mod populate;
 
 pub use assemble::AssemblyError;
-pub use populate::BYTES_AN_AXON;
+pub use populate::BYTES_A_CONE;
 
 use crate::model::adaptive::reach;
+use crate::model::births::BirthQueue;
 use crate::model::clock::{Clock, StageTime};
 use crate::model::components::{GrowthCone, Status};
 use crate::model::configuration::Configuration;
@@ -28,8 +29,6 @@ use bevy_ecs::prelude::{Schedule, With, World};
 pub struct Simulation {
     world: World,
     step: Schedule,
-    births: Vec<u64>,
-    next_birth: usize,
 }
 
 impl Simulation {
@@ -94,10 +93,6 @@ impl Simulation {
         self.bring_tissue_here();
         self.world.resource_mut::<Unrest>().0 = false;
         self.step.run(&mut self.world);
-        let reached = self.world.resource::<Clock>().now;
-        while self.births.get(self.next_birth).is_some_and(|birth| *birth < reached) {
-            self.next_birth += 1;
-        }
         match self.world.resource::<Health>().fault() {
             Some(fault) => Err(fault.clone()),
             None => Ok(()),
@@ -117,8 +112,6 @@ impl Simulation {
     pub fn restore(&mut self, kept: &[u8]) -> Result<(), Damage> {
         let state = self.world.resource::<KeptState>().clone();
         state.read(&mut self.world, kept)?;
-        let now = self.world.resource::<Clock>().now;
-        self.next_birth = self.births.partition_point(|birth| *birth < now);
         let stage = self.world.resource::<StageTime>().0;
         bring_tissue_to(&mut self.world, stage);
         self.lap("assembly");
@@ -146,7 +139,8 @@ impl Simulation {
     }
 
     fn is_idle(&mut self, to: u64) -> bool {
-        let none_due = self.births.get(self.next_birth).is_none_or(|birth| *birth >= to);
+        let next = self.world.resource::<BirthQueue>().waiting().last();
+        let none_due = next.is_none_or(|birth| birth.instant >= to);
         let mut cones = self.world.query_filtered::<&Status, With<GrowthCone>>();
         let calm = !self.world.resource::<Unrest>().0;
         none_due && calm && !cones.iter(&self.world).any(|status| *status == Status::Growing)

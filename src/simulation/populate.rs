@@ -4,10 +4,10 @@
 //! through the populations in the order of their names; their births are drawn within the population's interval.
 
 use super::assemble::AssemblyError;
-use crate::model::births::{BirthQueue, FirstHeading, Origin};
+use crate::model::births::{Birth, BirthQueue};
 use crate::model::clock::Clock;
 use crate::model::components::{
-    Axon, GrowthCone, Journey, Position, ReceptorWeights, Site, SpringState, Status, Velocity,
+    GrowthCone, Journey, Position, ReceptorWeights, Site, Spring, SpringState, Status, Velocity,
 };
 use crate::model::growth::{Population, Populations, ShaftPopulations};
 use crate::model::integrator::BYTES_A_STEP;
@@ -19,7 +19,7 @@ use crate::model::violation::Violation;
 use crate::numerics::simplex_mesh::BorderFacet;
 use crate::scenario::scene::{self, Direction, Heading, Scene};
 use bevy_ecs::entity::Entity;
-use bevy_ecs::prelude::{With, World};
+use bevy_ecs::prelude::World;
 use nalgebra::Vector3;
 use rand::RngExt;
 use std::f64::consts::TAU;
@@ -28,8 +28,6 @@ use std::f64::consts::TAU;
 const BIRTHS: Stream = Stream::named("births");
 /// Draw of the birth time.
 const WHEN: u64 = 0;
-/// Birth of a cone that waits for a branch.
-const NEVER: u64 = u64::MAX;
 /// Draw of the birth place.
 const WHERE: u64 = 1;
 /// Draw of the first heading.
@@ -41,21 +39,35 @@ const SHAFT_TOLERANCE: f64 = 0.5;
 const LONGEST_SEGMENT: f64 = 12.0;
 
 /// What is known of a growth cone, besides what mechanisms attach.
-type ConeState = (GrowthCone, Origin, Status, Site, Position, Velocity, SpringState, ReceptorWeights, Journey);
+type ConeState = (GrowthCone, Status, Site, Position, Velocity, SpringState, ReceptorWeights, Journey);
 
-/// Bytes of an axon and its growth cone: their components, and what is kept of the cone during a step.
-pub const BYTES_AN_AXON: usize = size_of::<Axon>() + size_of::<ConeState>() + BYTES_A_STEP;
+/// Bytes of a growth cone: its components, and what is kept of it during a step.
+pub const BYTES_A_CONE: usize = size_of::<ConeState>() + BYTES_A_STEP;
 
 /// Entities kept free for the resources that come after the cones. A resource is an entity too, and is looked up in a list as long
 /// as the number of that entity: behind the cones it would take eight bytes of each for every resource.
 const ROOM_FOR_RESOURCES: usize = 256;
 
-/// Spawns axons and growth cones, with `spares` more cones for each axon after those of all axons; returns the cones in order.
+/// Where a growth cone is born, and which way it heads.
+struct Origin {
+    site: Site,
+    heading: FirstHeading,
+}
+
+/// The heading a cone is born with.
+enum FirstHeading {
+    /// Along the inner normal of a face of its cell.
+    InnerNormal(u8),
+    /// A unit vector.
+    Fixed(Vector3<f64>),
+}
+
+/// Spawns growth cones, with `spares` more for each axon after those of all axons; returns them in order.
 pub(super) fn spawn_cones(world: &mut World, scene: &Scene, spares: u32) -> Result<Vec<Entity>, AssemblyError> {
     let room: Vec<Entity> = (0..ROOM_FOR_RESOURCES).map(|_| world.spawn_empty().id()).collect();
     let mut cones = Vec::new();
     let mut list = Vec::new();
-    let mut of_shaft = Vec::new();
+    let (mut births, mut of_shaft) = (Vec::new(), Vec::new());
     for (index, (name, keys)) in scene.populations.iter().enumerate() {
         list.push(Population { name: name.clone(), speed: keys.speed.0, count: keys.count as usize });
         let places = Places::new(world.resource::<Tissue>(), name, keys, cones.len() as u32)?;
@@ -63,18 +75,22 @@ pub(super) fn spawn_cones(world: &mut World, scene: &Scene, spares: u32) -> Resu
             let number = cones.len() as u32;
             let birth = birth_instant(world, scene, keys, number);
             let origin = places.origin(world.resource::<Tissue>(), scene.seed, number);
-            let axon = Axon { number, population: index as u16, birth };
-            cones.push(spawn(world, axon, origin, keys.speed.0));
+            let (face, heading) = match origin.heading {
+                FirstHeading::InnerNormal(face) => (Some(face), Vector3::zeros()),
+                FirstHeading::Fixed(heading) => (None, heading),
+            };
+            let identity = GrowthCone { axon: number, population: index as u16, speed: keys.speed.0, birth };
+            cones.push(spawn(world, identity, origin.site, Spring::heading_along(heading).into()));
+            births.push(Birth { instant: birth, cone: number, face });
             of_shaft.push(index as u16);
         }
     }
-    let births: Vec<u64> = cones.iter().filter_map(|&cone| world.get::<GrowthCone>(cone)).map(|c| c.birth).collect();
     let spare_cones = spawn_spares(world, &mut cones, &mut of_shaft, spares);
     room.into_iter().for_each(|entity| {
         world.despawn(entity);
     });
     world.insert_resource(Populations(list));
-    world.insert_resource(BirthQueue::new(births.into_iter()));
+    world.insert_resource(BirthQueue::new(births));
     world.insert_resource(spare_cones);
     world.insert_resource(ShaftPopulations(of_shaft));
     world.insert_resource(Shafts::new(cones.len(), SHAFT_TOLERANCE, LONGEST_SEGMENT));
@@ -85,43 +101,26 @@ pub(super) fn spawn_cones(world: &mut World, scene: &Scene, spares: u32) -> Resu
 fn spawn_spares(world: &mut World, cones: &mut Vec<Entity>, of_shaft: &mut Vec<u16>, each: u32) -> SpareCones {
     let axons = cones.len();
     for axon in 0..axons {
-        let Some((&own, &origin)) = world.get::<GrowthCone>(cones[axon]).zip(world.get::<Origin>(cones[axon])) else {
+        let Some((&own, &site)) = world.get::<GrowthCone>(cones[axon]).zip(world.get::<Site>(cones[axon])) else {
             continue;
         };
         for _ in 0..each {
-            let number = cones.len() as u32;
-            let identity = GrowthCone { axon: number, birth: NEVER, birth_time: 0.0, ..own };
-            cones.push(spawn_cone(world, identity, origin));
+            let identity = GrowthCone { axon: cones.len() as u32, birth: GrowthCone::NEVER, ..own };
+            cones.push(spawn(world, identity, site, SpringState::default()));
             of_shaft.push(own.population);
         }
     }
     SpareCones::new(axons as u32, each)
 }
 
-/// The instants of all births (ticks), ascending.
-pub(super) fn births_in_order(world: &mut World) -> Vec<u64> {
-    let mut cones = world.query_filtered::<&GrowthCone, With<GrowthCone>>();
-    let mut births: Vec<u64> = cones.iter(world).map(|cone| cone.birth).filter(|birth| *birth != NEVER).collect();
-    births.sort_unstable();
-    births
-}
-
-fn spawn(world: &mut World, axon: Axon, origin: Origin, speed: f64) -> Entity {
-    world.spawn(axon);
-    let birth_time = world.resource::<Clock>().grid.hours(axon.birth);
-    let identity = GrowthCone { axon: axon.number, population: axon.population, speed, birth: axon.birth, birth_time };
-    spawn_cone(world, identity, origin)
-}
-
-fn spawn_cone(world: &mut World, identity: GrowthCone, origin: Origin) -> Entity {
+fn spawn(world: &mut World, identity: GrowthCone, site: Site, spring: SpringState) -> Entity {
     let state: ConeState = (
         identity,
-        origin,
         Status::default(),
-        origin.site,
+        site,
         Position::default(),
         Velocity::default(),
-        SpringState::default(),
+        spring,
         ReceptorWeights::default(),
         Journey::default(),
     );
@@ -204,7 +203,7 @@ impl Places {
                 let along = (f64::from(number - first) + share) / count * areas.last().copied().unwrap_or_default();
                 let cell = areas.partition_point(|sum| *sum <= along).min(areas.len() - 1);
                 // Folded back, two even draws fill the triangle evenly.
-                let weights = if a + b > 1.0 { [1.0 - a, 1.0 - b, 0.0] } else { [a, b, 0.0] };
+                let weights = if a + b > 1.0 { [1.0 - a, 1.0 - b] } else { [a, b] };
                 (Site { cell: cell as u32, weights }, None)
             }
         };
@@ -215,7 +214,7 @@ impl Places {
         let fixed = |angle: f64| FirstHeading::Fixed(Vector3::new(angle.cos(), angle.sin(), 0.0));
         match (self.heading, facet) {
             (Heading::Angle(angle), _) => fixed(angle.radians()),
-            (Heading::Along(Direction::InnerNormal), Some(facet)) => FirstHeading::InnerNormal(facet),
+            (Heading::Along(Direction::InnerNormal), Some(facet)) => FirstHeading::InnerNormal(facet.face),
             (Heading::Along(_), _) => fixed(TAU * KeyedRng::new(seed, number, BIRTHS, WHITHER).share()),
         }
     }
@@ -237,7 +236,7 @@ fn on_facet(facet: BorderFacet, first: f64) -> Site {
     let mut all = [0.0; 3];
     all[(face + 1) % 3] = first;
     all[(face + 2) % 3] = 1.0 - first;
-    Site { cell: facet.cell, weights: [all[1], all[2], 0.0] }
+    Site { cell: facet.cell, weights: [all[1], all[2]] }
 }
 
 fn length(tissue: &Tissue, facet: BorderFacet) -> f64 {

@@ -183,7 +183,7 @@ pub fn cones(simulation: &Simulation) -> Vec<ConeView> {
     let query = world.try_query_filtered::<(&Site, &SpringState, &Journey), With<GrowthCone>>();
     let view = |(site, spring, journey): (&Site, &SpringState, &Journey)| ConeView {
         position: now.position(mesh, *site),
-        heading: spring.heading,
+        heading: spring.seen().heading,
         length: journey.length,
     };
     query.map(|mut query| query.iter(world).map(view).collect()).unwrap_or_default()

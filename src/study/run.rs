@@ -8,6 +8,7 @@ use crate::model::mechanism::{Entry, Facts, Roster};
 use crate::model::shelf::Shelf;
 use crate::model::violation::Violation;
 use crate::record::checkpoint::CheckpointError;
+use crate::record::csv::IN_MEMORY;
 use crate::record::files::{OutputError, Outputs};
 use crate::record::manifest::Manifest;
 use crate::record::output::{WriteError, write_atomically};
@@ -30,6 +31,8 @@ use std::path::{Path, PathBuf};
 
 /// Resolution of pictures, dots an inch.
 pub(super) const DPI: f32 = 200.0;
+/// The file of trajectories in a folder of results.
+pub const TRAJECTORIES: &str = "trajectories.csv";
 
 /// Why there are no results, or not all of them.
 #[derive(Debug, thiserror::Error)]
@@ -203,6 +206,7 @@ impl Run {
     /// # Errors
     /// A file that could not be written.
     pub fn writes_into(&mut self, folder: &Path, loaded: &Loaded) -> Result<(), RunError> {
+        self.recorder.trajectories.stream_into(&folder.join(TRAJECTORIES), IN_MEMORY);
         let grid = self.simulation.world().resource::<Clock>().grid;
         self.outputs = Outputs::create(&loaded.scene.output, folder, &grid)?;
         Ok(())
@@ -215,6 +219,7 @@ impl Run {
     pub fn keep_records(&self) -> Result<Vec<u8>, WriteError> {
         let mut bytes = Vec::new();
         self.recorder.keep(&mut bytes);
+        self.recorder.trajectories.keep_streamed(&mut bytes)?;
         self.outputs.keep(&mut bytes)?;
         Ok(bytes)
     }
@@ -227,7 +232,9 @@ impl Run {
         let damaged = |damage: Damage| RunError::Resume(CheckpointError::from(damage).to_string());
         self.simulation.restore(state).map_err(damaged)?;
         let mut records = KeptBytes::new(records);
-        let recorder: Recorder = records.read().map_err(damaged)?;
+        let mut recorder: Recorder = records.read().map_err(damaged)?;
+        let fresh = &mut self.recorder.trajectories;
+        recorder.trajectories.restore_streamed(&mut records, fresh).map_err(damaged)?;
         if let Some(defect) = recorder.defect(&self.recorder, self.simulation.world()) {
             return Err(damaged(Damage(format!("records: {defect}"))));
         }
@@ -344,12 +351,12 @@ pub(super) fn recorder_options(loaded: &Loaded, keep: Records) -> RecorderOption
 /// The file that could not be written, or the picture that could not be drawn.
 pub fn write_results(folder: &Path, asked: Asked, finished: &mut Finished) -> Result<(), RunError> {
     let loaded = asked.loaded;
-    let Recorder { trajectories, snapshots, .. } = &finished.recorder;
     let manifest = write_json(&folder.join("manifest.json"), &Manifest::of(loaded));
     let report = asked.report_run(folder, finished);
+    let Recorder { trajectories, snapshots, .. } = &mut finished.recorder;
     let (table, figure) = rayon::join(
         || match loaded.scene.output.tables.are_csv() {
-            true => trajectories.write(&folder.join("trajectories.csv")),
+            true => trajectories.write(&folder.join(TRAJECTORIES)),
             false => Ok(()),
         },
         || write_figure(folder, loaded, snapshots),

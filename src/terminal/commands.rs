@@ -21,7 +21,9 @@ use crate::study::laboratory::Laboratory;
 use crate::study::plan::plan;
 use crate::study::report::Asked;
 use crate::study::room::Room;
-use crate::study::run::{RunError, block_schemas, folder_of, write_figure, write_json, write_pooled_figure};
+use crate::study::run::{
+    RunError, TRAJECTORIES, block_schemas, folder_of, write_figure, write_json, write_pooled_figure,
+};
 use crate::study::seeds::{SeedsSummary, over_seeds_until, summarise};
 use crate::study::stability::Stability;
 use serde::Serialize;
@@ -220,7 +222,7 @@ pub fn run_seeds(cli: &Cli, roster: &Roster, loaded: &Loaded, folder: &Path, cou
     let bar = progress_bar(count as f64, "seeds");
     let tick = |share| bar.set_position((share * 1000.0) as u64);
     let stop = || interrupt.caught().map(|signal| signal.name.to_owned());
-    let runs = over_seeds_until(loaded, roster, &cli.scene.path(), count, (tick, stop))?;
+    let mut runs = over_seeds_until(loaded, roster, &cli.scene.path(), count, (tick, stop))?;
     bar.finish_and_clear();
     let signal = interrupt.caught().filter(|_| (runs.len() as u64) < count);
     if let Some(signal) = signal {
@@ -234,9 +236,9 @@ pub fn run_seeds(cli: &Cli, roster: &Roster, loaded: &Loaded, folder: &Path, cou
     let summary = SeedsSummary { complete: found.complete && signal.is_none(), ..found };
     write_json(&folder.join("summary.json"), &summary)?;
     write_json(&folder.join("manifest.json"), &Manifest::of(loaded))?;
-    if let Some(first) = runs.first() {
+    if let Some(first) = runs.first_mut() {
         if loaded.scene.output.tables.are_csv() {
-            first.recorder.trajectories.write(&folder.join("trajectories.csv"))?;
+            first.recorder.trajectories.write(&folder.join(TRAJECTORIES))?;
         }
         write_figure(folder, loaded, &first.recorder.snapshots)?;
         write_pooled_figure(folder, loaded, &runs)?;

@@ -22,7 +22,7 @@ pub struct Asking {
 impl Asking {
     /// A cone as it asks.
     #[inline]
-    pub fn of((cone, spring): (Cone, &SpringState)) -> Self {
+    pub fn of((cone, spring): (Cone, Spring)) -> Self {
         Self {
             index: cone.index as u32,
             population: cone.identity.population,

@@ -98,21 +98,31 @@ impl Squares {
     }
 }
 
+/// The largest whole number that is not above a number: `f64::floor` is a call on processors for which programs are commonly compiled.
+fn floor(x: f64) -> i32 {
+    let towards_zero = x as i32;
+    towards_zero.saturating_sub(i32::from(f64::from(towards_zero) > x))
+}
+
 /// The square of side `side` (µm) that a point lies in.
 pub fn square(x: [f64; 2], side: f64) -> Square {
-    let [column, row] = x.map(|x| (x / side).floor() as i32);
+    let [column, row] = x.map(|x| floor(x / side));
     morton(column, row)
 }
 
 /// The squares of side `side` that come nearer than `margin` (µm) to a point, rows first, each with a bit for each of its parts
 /// that does.
 pub fn squares_near(x: [f64; 2], margin: f64, side: f64) -> impl Iterator<Item = (Square, u16)> {
-    let low = x.map(|x| ((x - margin) / side).floor() as i32);
-    let high = x.map(|x| ((x + margin) / side).floor() as i32);
-    let squares = (low[1]..=high[1]).flat_map(move |row| (low[0]..=high[0]).map(move |column| [column, row]));
-    squares
-        .map(move |at| (morton(at[0], at[1]), parts_near(at.map(|i| f64::from(i) * side), x, margin, side)))
-        .filter(|(_, parts)| *parts != 0)
+    let low = x.map(|x| floor((x - margin) / side));
+    let high = x.map(|x| floor((x + margin) / side));
+    let rows = (low[1]..=high[1]).map(move |row| (row, away(f64::from(row) * side, x[1], side)));
+    let squares = rows.flat_map(move |(row, rows)| {
+        (low[0]..=high[0]).map(move |column| {
+            let columns = away(f64::from(column) * side, x[0], side);
+            (morton(column, row), within(margin, side, [&columns, &rows]))
+        })
+    });
+    squares.filter(|(_, parts)| *parts != 0)
 }
 
 /// Low and high corner (µm) of a square.
@@ -154,23 +164,32 @@ const ALONG: usize = 4;
 pub fn part_of(x: [f64; 2], side: f64) -> u16 {
     let [column, row] = x.map(|x| {
         let share = x / side;
-        (((share - share.floor()) * ALONG as f64) as usize).min(ALONG - 1)
+        (((share - f64::from(floor(share))) * ALONG as f64) as usize).min(ALONG - 1)
     });
     1 << (row * ALONG + column)
 }
 
 /// The bits of the parts of a square with this low corner to which a point is nearer than `margin` (µm).
 pub fn parts_near(low: [f64; 2], x: [f64; 2], margin: f64, side: f64) -> u16 {
+    let [columns, rows] = [0, 1].map(|k| away(low[k], x[k], side));
+    within(margin, side, [&columns, &rows])
+}
+
+/// Squared distances (µm²) along one axis from the parts of a square that begins at `from` to a point at `x`.
+fn away(from: f64, x: f64, side: f64) -> [f64; ALONG] {
     let width = side / ALONG as f64;
+    let larger = |a: f64, b: f64| if a > b { a } else { b };
+    std::array::from_fn(|i| {
+        let from = from + i as f64 * width - x;
+        let away = larger(larger(from, -(from + width)), 0.0);
+        away * away
+    })
+}
+
+/// The bits of the parts of a square that are nearer than `margin` (µm), by their squared distances along both axes.
+fn within(margin: f64, side: f64, [columns, rows]: [&[f64; ALONG]; 2]) -> u16 {
     // A hair more, for the rounding of places and corners.
     let reach = margin * (1.0 + 1e-9) + 1e-9 * side;
-    let squared = |k: usize, i: usize| {
-        let from = low[k] + i as f64 * width - x[k];
-        let away = from.max(-(from + width)).max(0.0);
-        away * away
-    };
-    let columns: [f64; ALONG] = std::array::from_fn(|i| squared(0, i));
-    let rows: [f64; ALONG] = std::array::from_fn(|i| squared(1, i));
     let near = |part: usize| columns[part % ALONG] + rows[part / ALONG] <= reach * reach;
     (0..ALONG * ALONG).fold(0, |bits, part| bits | u16::from(near(part)) << part)
 }

@@ -8,7 +8,7 @@ use bevy_ecs::prelude::{With, World};
 use serde_json::Value;
 use tropism::model::clock::Clock;
 use tropism::model::shafts::Shafts;
-use tropism::prelude::{GrowthCone, Journey, Position, Roster, SpringState, Status, Vector3};
+use tropism::prelude::{GrowthCone, Journey, Position, Roster, Spring, SpringState, Status, Vector3};
 use tropism::record::recorder::{Recorder, RecorderOptions};
 use tropism::scenario::load::{Loaded, Request, ScenarioErrors};
 use tropism::simulation::Simulation;
@@ -96,9 +96,11 @@ pub fn observed(loaded: &Loaded, roster: &Roster) -> (String, Simulation) {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ConeState {
     pub identity: GrowthCone,
+    /// Time of birth (h).
+    pub birth_time: f64,
     pub status: Status,
     pub position: Vector3<f64>,
-    pub spring: SpringState,
+    pub spring: Spring,
     pub journey: Journey,
 }
 
@@ -107,13 +109,15 @@ pub fn cones(world: &World) -> Vec<ConeState> {
     let mut query = world
         .try_query_filtered::<(&GrowthCone, &Status, &Position, &SpringState, &Journey), With<GrowthCone>>()
         .unwrap();
+    let grid = &world.resource::<Clock>().grid;
     query
         .iter(world)
         .map(|(identity, status, position, spring, journey)| ConeState {
             identity: *identity,
+            birth_time: identity.birth_time(grid),
             status: *status,
-            position: position.0,
-            spring: *spring,
+            position: position.in_space(),
+            spring: spring.seen(),
             journey: *journey,
         })
         .collect()

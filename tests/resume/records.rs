@@ -33,6 +33,7 @@ type Spoil<'a> = &'a dyn Fn(&mut Recorder);
 fn refusal(checkpoint: &Checkpoint, recorder: &Recorder) -> Option<String> {
     let mut bytes = Vec::new();
     recorder.keep(&mut bytes);
+    recorder.trajectories.keep_streamed(&mut bytes).unwrap();
     let forged = Checkpoint { recorder: bytes, ..checkpoint.clone() };
     resumed(&forged, &systems::standard(), None).err().map(|error| error.to_string())
 }

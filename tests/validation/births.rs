@@ -2,8 +2,7 @@
 
 use crate::common::cones;
 use serde_json::{Value, json};
-use tropism::model::births::Origin;
-use tropism::prelude::Tissue;
+use tropism::prelude::{GrowthCone, Site, Tissue, With};
 use tropism::systems;
 
 const COUNT: usize = 2000;
@@ -33,10 +32,11 @@ fn births(origin: Value, seed: u64) -> (Vec<f64>, Vec<[f64; 2]>) {
     });
     let simulation = crate::common::assembled(&scene, &systems::standard());
     let world = simulation.world();
-    let times = cones(world).iter().map(|cone| (cone.identity.birth_time - 3.0) / 15.0).collect();
+    let times = cones(world).iter().map(|cone| (cone.birth_time - 3.0) / 15.0).collect();
     let tissue = world.resource::<Tissue>();
-    let mut origins = world.try_query::<&Origin>().unwrap();
-    let place = |origin: &Origin| tissue.reference_position(origin.site);
+    // Before birth a cone's site is where it will be born.
+    let mut origins = world.try_query_filtered::<&Site, With<GrowthCone>>().unwrap();
+    let place = |origin: &Site| tissue.reference_position(*origin);
     (times, origins.iter(world).map(place).map(|x| [x.x, x.y]).collect())
 }
 

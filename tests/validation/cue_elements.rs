@@ -80,7 +80,7 @@ fn what_is_sensed_as_raw_is_the_slope_of_what_is_sensed_as_concentration() {
         let configuration = world.resource::<Configuration>();
         let at = |site: Site| (field.sample)(world, field.index, site);
         for place in places() {
-            let site = Site { weights: [0.2, 0.5, 0.0], ..tissue.locate(place).unwrap() };
+            let site = Site { weights: [0.2, 0.5], ..tissue.locate(place).unwrap() };
             let gradient = at(site).1;
             for i in 0..2 {
                 let shifted = |sign: f64| {

@@ -4,9 +4,8 @@
 use crate::common::{cones, ended, hash_of_states, loaded, recorded, to_end, try_load};
 use crate::fixed_pull::roster;
 use serde_json::{Map, Value, json};
-use tropism::model::births::Origin;
 use tropism::numerics::bessel;
-use tropism::prelude::Tissue;
+use tropism::prelude::{GrowthCone, Site, Tissue, With};
 use tropism::scenario::load::Request;
 use tropism::simulation::Simulation;
 use tropism::study::run::read;
@@ -88,8 +87,7 @@ fn a_leader_slows_down_in_its_region_and_a_follower_on_its_shaft_does_not() {
     });
     let axons = [([500.0, 200.0], 90.0, 0.0), ([501.0, 200.0], 90.0, 20.0)];
     let end = ended(&scene(&axons, 70.0, step, blocks), &roster());
-    let travelled: Vec<f64> =
-        cones(end.world()).iter().map(|cone| cone.journey.ended - cone.identity.birth_time).collect();
+    let travelled: Vec<f64> = cones(end.world()).iter().map(|cone| cone.journey.ended - cone.birth_time).collect();
     let (leader, follower) = (500.0 / SPEED + 100.0 / (0.25 * SPEED), 600.0 / SPEED);
     assert!((travelled[0] - leader).abs() < 4.0 * step, "{} for {leader}", travelled[0]);
     assert!((travelled[1] - follower).abs() < 1e-9, "{} for {follower}", travelled[1]);
@@ -248,14 +246,14 @@ fn axons_born_before_a_front_arrives_pass_and_later_ones_turn() {
         let mut simulation = Simulation::assemble(&scene, &tropism::systems::standard()).unwrap();
         let origins: Vec<f64> = {
             let (world, tissue) = (simulation.world(), simulation.world().resource::<Tissue>());
-            let mut query = world.try_query::<&Origin>().unwrap();
-            query.iter(world).map(|origin| tissue.reference_position(origin.site).x).collect()
+            let mut query = world.try_query_filtered::<&Site, With<GrowthCone>>().unwrap();
+            query.iter(world).map(|origin| tissue.reference_position(*origin).x).collect()
         };
         to_end(&mut simulation);
         let mut ways: Vec<(f64, f64)> = cones(simulation.world())
             .iter()
             .zip(origins)
-            .map(|(cone, origin)| (cone.identity.birth_time, cone.position.x - origin))
+            .map(|(cone, origin)| (cone.birth_time, cone.position.x - origin))
             .collect();
         ways.sort_by(|a, b| a.0.total_cmp(&b.0));
         let mean = |part: &[(f64, f64)]| part.iter().map(|(_, way)| way).sum::<f64>() / part.len() as f64;

@@ -40,7 +40,7 @@ fn a_cone_that_splits_leaves_two_at_the_angle_from_where_it_was() {
     let (trunk, branch) = (path(end.world(), 0), path(end.world(), 1));
     let fork = branch[0];
     assert!(trunk.iter().any(|point| (point[0] - fork[0]).hypot(point[1] - fork[1]) < 1e-9), "{fork:?}");
-    assert!((fork[1] - 200.0 - SPEED * found[1].identity.birth_time).abs() < 1e-9, "{fork:?}");
+    assert!((fork[1] - 200.0 - SPEED * found[1].birth_time).abs() < 1e-9, "{fork:?}");
     assert_eq!(end.world().resource::<SpareCones>().parent(1), Some(0));
 }
 

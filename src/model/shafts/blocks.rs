@@ -61,7 +61,7 @@ impl Block {
         let place = usize::from(self.used);
         self.cells[place] = site.cell;
         self.times[place] = time;
-        self.weights[place] = [site.weights[0], site.weights[1]];
+        self.weights[place] = site.weights;
         self.used += 1;
         place
     }

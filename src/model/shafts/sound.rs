@@ -15,7 +15,7 @@ impl Shafts {
             ("a page holds blocks that are taken", &|| self.blocks.pages_are_free(self.chains.len())),
             ("a block holds more than it can", &|| blocks.iter().all(|block| usize::from(block.used) <= BLOCK)),
             ("a vertex lies in no cell", &|| blocks.iter().all(|block| block.lies_in(cells))),
-            ("a tip lies in no cell", &|| self.chains.iter().all(|chain| there(chain.tip.cell))),
+            ("a tip lies in no cell", &|| self.chains.iter().all(|chain| there(chain.tip_cell))),
             ("a vertex that was laid or struck out is none", &|| {
                 let laid = self.laid.iter().all(|&vertex| (vertex as usize) < places);
                 laid && self.struck.iter().all(|struck| (struck.vertex as usize) < places && there(struck.point.cell))
@@ -61,7 +61,8 @@ mod tests {
         shafts.watch();
         for shaft in [0, 1] {
             shafts.start(shaft, Site::default(), [0.0; 2], 0.0);
-            (1..40).for_each(|i| shafts.extend(shaft, Site::default(), [12.0 * f64::from(i), 0.0], 1.0));
+            let at = |i: i32| [12.0 * f64::from(i), 0.0];
+            (1..40).for_each(|i| shafts.extend(shaft, (Site::default(), at(i)), 1.0, |_| at(i - 1)));
         }
         shafts
     }
@@ -77,7 +78,7 @@ mod tests {
             |shafts| shafts.blocks = Blocks::new(2),
             |shafts| shafts.blocks.get_mut(0).used = 17,
             |shafts| shafts.blocks.get_mut(0).used = 0,
-            |shafts| shafts.chains[1].tip.cell = 7,
+            |shafts| shafts.chains[1].tip_cell = 7,
             |shafts| shafts.laid.push(1000),
             |shafts| shafts.blocks.get_mut(shafts.chains[0].last).next = shafts.chains[0].first,
             |shafts| shafts.chains[0].first = 99,

@@ -1,6 +1,6 @@
 //! A table in the forms that a scene asks for.
 
-use super::super::csv::{Cell, CsvTable};
+use super::super::csv::{Cell, CsvTable, IN_MEMORY};
 use super::super::output::WriteError;
 use super::OutputError;
 use super::parquet::{Kind, ParquetTable};
@@ -25,7 +25,11 @@ impl Table {
     pub fn create(folder: &Path, name: &str, forms: Tables, columns: &[Heading]) -> Result<Self, OutputError> {
         let path = |ending: &str| folder.join(format!("{name}.{ending}"));
         let heads: Vec<(&str, &str)> = columns.iter().map(|(name, unit, _)| (*name, *unit)).collect();
-        let csv = forms.are_csv().then(|| (path("csv"), CsvTable::new(&heads)));
+        let csv = forms.are_csv().then(|| {
+            let mut table = CsvTable::new(&heads);
+            table.stream_into(&path("csv"), IN_MEMORY);
+            (path("csv"), table)
+        });
         let head = |(name, unit, kind): &Heading| match *unit {
             "" => ((*name).to_owned(), *kind),
             unit => (format!("{name} [{unit}]"), *kind),
@@ -53,6 +57,7 @@ impl Table {
     pub fn keep(&self, into: &mut Vec<u8>) -> Result<(), WriteError> {
         if let Some((_, csv)) = &self.csv {
             csv.keep(into);
+            csv.keep_streamed(into)?;
         }
         self.parquet.as_ref().map_or(Ok(()), |parquet| parquet.keep(into))
     }
@@ -63,7 +68,8 @@ impl Table {
     /// Bytes that are of no such table; what could not be written.
     pub fn restore(&mut self, from: &mut KeptBytes) -> Result<(), OutputError> {
         if let Some((_, csv)) = &mut self.csv {
-            let read: CsvTable = from.read()?;
+            let mut read: CsvTable = from.read()?;
+            read.restore_streamed(from, csv)?;
             if !read.continues(csv) {
                 return Err(Damage("a table for other tools has other columns".into()).into());
             }
@@ -77,7 +83,7 @@ impl Table {
     /// # Errors
     /// What could not be written.
     pub fn finish(self) -> Result<(), OutputError> {
-        if let Some((path, csv)) = self.csv {
+        if let Some((path, mut csv)) = self.csv {
             csv.write(&path)?;
         }
         Ok(self.parquet.map_or(Ok(()), ParquetTable::finish)?)

@@ -5,7 +5,7 @@ use super::super::leaves::leaves;
 use super::super::measures::{MeasureOptions, path_length, straightness, turning_angle};
 use super::super::output::WriteError;
 use super::super::recorder::trajectory_rows;
-use super::super::snapshot::{axon_records, extent_in_y, tips};
+use super::super::snapshot::{each_axon, extent_in_y, tips};
 use super::super::summary::{counts, morphology};
 use super::parquet::Kind;
 use super::table::{Heading, Table};
@@ -93,11 +93,13 @@ fn add_tips(table: &mut Table, world: &World) -> Result<(), OutputError> {
 fn add_axons(table: &mut Table, world: &World) -> Result<(), OutputError> {
     let (hours, spares) = (world.resource::<Clock>().hours(), world.resource::<SpareCones>());
     let populations = &world.resource::<Populations>().0;
-    for (tip, axon) in tips(world).into_iter().zip(axon_records(world)) {
+    let (mut tips, mut written) = (tips(world).into_iter(), Ok(()));
+    each_axon(world, |axon| {
+        let Some(tip) = tips.next().filter(|_| written.is_ok()) else { return };
         let name = populations.get(usize::from(axon.population)).map_or("", |population| &population.name);
         let parent = spares.parent(tip.axon).map_or(Cell::Empty, |parent| Cell::Integer(parent.into()));
         let turned = turning_angle(axon.initial_heading, &axon.shaft).map(f64::to_degrees);
-        table.push(&[
+        written = table.push(&[
             hours.into(),
             Cell::Integer(tip.axon.into()),
             Cell::Integer(spares.root(tip.axon).into()),
@@ -110,9 +112,9 @@ fn add_axons(table: &mut Table, world: &World) -> Result<(), OutputError> {
             path_length(&axon.shaft).into(),
             straightness(&axon.shaft).into(),
             turned.into(),
-        ])?;
-    }
-    Ok(())
+        ]);
+    });
+    written
 }
 
 /// `measures`: a row a time, with the numbers of counts and morphology that `summary.json` has.

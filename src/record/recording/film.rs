@@ -159,7 +159,7 @@ impl Film {
         let bounds = self.bounds();
         let quantised = Quantised { bounds, last };
         let cones = cones(world);
-        let spares = world.resource::<SpareCones>();
+        let (spares, grid) = (world.resource::<SpareCones>(), &world.resource::<Clock>().grid);
         let (mut shaft_start, mut seen) = (vec![0], Vec::new());
         for shaft in self.shafts.shafts() {
             seen.extend_from_slice(shaft);
@@ -192,7 +192,7 @@ impl Film {
             tip_heading: self.tips.iter().flatten().map(|tip| tip.heading).collect(),
             tip_status: self.tips.iter().flatten().map(|tip| tip.status).collect(),
             axon_population: cones.iter().map(|cone| cone.population).collect(),
-            axon_birth: cones.iter().map(|cone| cone.birth_time as f32).collect(),
+            axon_birth: cones.iter().map(|cone| cone.birth_time(grid) as f32).collect(),
             axon_heading: Some(first_headings(world)),
             axon_parent: cones.iter().map(|cone| spares.parent(cone.axon).unwrap_or(NO_PARENT)).collect(),
             shaft_start,

@@ -123,7 +123,7 @@ mod tests {
     use crate::model::shafts::ShaftPoint;
 
     fn site(x: f64) -> Site {
-        Site { cell: 0, weights: [x, 0.1, 0.0] }
+        Site { cell: 0, weights: [x, 0.1] }
     }
 
     /// Weights of what a history says was there at a time.
@@ -138,7 +138,8 @@ mod tests {
         let mut shafts = Shafts::new(1, 0.0, 0.01);
         let mut history = ShaftHistory::default();
         shafts.start(0, site(0.0), [0.0, 0.0], 0.0);
-        (1..=4).for_each(|i| shafts.extend(0, site(0.1 * f64::from(i)), [0.1 * f64::from(i), 0.0], f64::from(i)));
+        let at = |site: Site| [site.weights[0], 0.0];
+        (1..=4).map(f64::from).for_each(|i| shafts.extend(0, (site(0.1 * i), [0.1 * i, 0.0]), i, at));
         history.observe(&shafts, 4.0);
         assert!(!history.has_struck());
         let first = there(&history, 4.0);

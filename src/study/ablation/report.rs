@@ -16,7 +16,7 @@ use std::path::Path;
 pub fn write(folder: &Path, asked: Asked, ablation: &Ablation) -> Result<(), RunError> {
     write_json(&folder.join("ablation.json"), ablation)?;
     write_json(&folder.join("manifest.json"), &Manifest::of(asked.loaded))?;
-    let table = table(ablation).map_err(|error| RunError::Internal(error.to_string()))?;
+    let mut table = table(ablation).map_err(|error| RunError::Internal(error.to_string()))?;
     table.write(&folder.join("ablation.csv"))?;
     asked.report_ablation(folder, ablation)?;
     match ablation.figure()? {

@@ -5,10 +5,10 @@
 //! It takes its constants from keys that the scene spells out, and its tissue and fields from a simulation in which no cone is born. Its
 //! cones end where those of the simulation end.
 
-use crate::model::births::{FirstHeading, Origin};
+use crate::model::births::BirthQueue;
 use crate::model::brownian::HeadingPaths;
 use crate::model::clock::Clock;
-use crate::model::components::{GrowthCone, Site};
+use crate::model::components::{GrowthCone, Site, SpringState};
 use crate::model::configuration::Configuration;
 use crate::model::growth::{Growth, Targets};
 use crate::model::shafts::{Shafts, Successor, VertexId};
@@ -127,29 +127,30 @@ pub struct PlainLoop {
 }
 
 impl PlainLoop {
-    /// The loop over the cones of a simulation, from their births on; `stage` has the same tissue and fields.
+    /// The loop over the cones of a simulation, from their births on; `stage` has the same tissue and fields, and the same cones before birth.
     ///
     /// # Errors
     /// In words, what keeps the loop from running this scene.
     pub fn new(loaded: &Loaded, simulation: &World, stage: &World) -> Result<Self, String> {
         let (world, laws) = (stage, Laws::of(loaded, stage)?);
-        let mut query = simulation
-            .try_query_filtered::<(&GrowthCone, &Origin), With<GrowthCone>>()
-            .ok_or_else(|| "the scene has no cones".to_owned())?;
-        let plain = |(cone, origin): (&GrowthCone, &Origin)| match origin.heading {
-            FirstHeading::Fixed(heading) => Ok(PlainCone {
-                axon: cone.axon,
-                birth: cone.birth,
-                birth_time: cone.birth_time,
-                speed: cone.speed,
-                site: origin.site,
-                heading,
-                pull: Vector3::zeros(),
-                grows: false,
-            }),
-            FirstHeading::InnerNormal(_) => Err("the plain loop needs headings at birth that are fixed".to_owned()),
+        if stage.resource::<BirthQueue>().waiting().iter().any(|birth| birth.face.is_some()) {
+            return Err("the plain loop needs headings at birth that are fixed".to_owned());
+        }
+        let identities = simulation.try_query_filtered::<&GrowthCone, With<GrowthCone>>();
+        let unborn = stage.try_query_filtered::<(&Site, &SpringState), With<GrowthCone>>();
+        let (mut identities, mut unborn) = identities.zip(unborn).ok_or_else(|| "the scene has no cones".to_owned())?;
+        let grid = simulation.resource::<Clock>().grid;
+        let plain = |(cone, (site, spring)): (&GrowthCone, (&Site, &SpringState))| PlainCone {
+            axon: cone.axon,
+            birth: cone.birth,
+            birth_time: cone.birth_time(&grid),
+            speed: cone.speed,
+            site: *site,
+            heading: spring.seen().heading,
+            pull: Vector3::zeros(),
+            grows: false,
         };
-        let cones = query.iter(simulation).map(plain).collect::<Result<Vec<_>, _>>()?;
+        let cones: Vec<PlainCone> = identities.iter(simulation).zip(unborn.iter(stage)).map(plain).collect();
         let mut births: Vec<u32> = (0..cones.len() as u32).collect();
         births.sort_by_key(|&i| cones[i as usize].birth);
         let own = world.resource::<Shafts>();
@@ -217,7 +218,8 @@ impl PlainLoop {
         for (i, cone) in moved {
             self.cones[i as usize] = cone;
             let at = self.tissue.reference_position(cone.site);
-            self.shafts.extend(i as usize, cone.site, [at.x, at.y], end);
+            let reference = |site| self.tissue.reference_position(site).xy().into();
+            self.shafts.extend(i as usize, (cone.site, [at.x, at.y]), end, reference);
         }
     }
 

@@ -7,6 +7,7 @@
 use super::{Estimate, Expectation, held};
 use crate::model::plan::Plan;
 use crate::model::tissue::Tissue;
+use crate::record::csv::IN_MEMORY;
 use crate::record::scene_figure::PictureSize;
 use bevy_ecs::prelude::World;
 
@@ -16,7 +17,7 @@ pub(super) const MEGABYTE: f64 = 1e6;
 const PROGRAM: f64 = 9.5e6;
 /// Meshing and setting up fields, a vertex of the mesh (bytes): most of it is given back, but stays with the process.
 pub(super) const SETTING_UP: f64 = 1100.0;
-/// A row of `trajectories.csv`, as it stands in memory until it is written (bytes).
+/// A row of `trajectories.csv`, as it stands in memory until it goes to the disk (bytes).
 const ROW: f64 = 80.0;
 /// A shaft vertex in a snapshot, its panel and the drawing (bytes).
 const DRAWN_VERTEX: f64 = 48.0;
@@ -27,7 +28,9 @@ pub fn estimate(world: &World, expected: &Expectation, figure: Option<&PictureSi
     let tissue = world.resource::<Tissue>();
     estimate.add("program", PROGRAM);
     estimate.add("mesh", SETTING_UP * tissue.mesh.vertex_count() as f64);
-    estimate.add("trajectories", ROW * expected.trajectory_points);
+    // The rows of one instant stand there twice, piece by piece and together.
+    let most = IN_MEMORY as f64 + 2.0 * ROW * expected.axons;
+    estimate.add("trajectories", most.min(ROW * expected.trajectory_points));
     estimate.add("recording", expected.recording_bytes);
     let drawing = figure.map_or(0.0, |figure| figure.bytes_to_draw() + DRAWN_VERTEX * expected.drawn_vertices);
     // The recording as it is written is a second copy, which has gone when the figure is drawn: the larger of both counts.

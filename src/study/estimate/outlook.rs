@@ -7,7 +7,7 @@ use super::Estimate;
 use super::memory::{MEGABYTE, SETTING_UP};
 use crate::model::shafts::Shafts;
 use crate::scenario::scene::Scene;
-use crate::simulation::BYTES_AN_AXON;
+use crate::simulation::BYTES_A_CONE;
 
 /// The memory (MB) that axons and mesh of a scene take at least. A mesh that is refused for its number of vertices counts with
 /// as many as are allowed.
@@ -15,7 +15,7 @@ pub fn outlook(scene: &Scene) -> Estimate {
     let axons: f64 = scene.populations.values().map(|population| population.count as f64).sum();
     let vertices = scene.tissue.expected_vertices().min(scene.tissue.max_vertices as f64);
     let mut estimate = Estimate::default();
-    estimate.add("axons", axons * (BYTES_AN_AXON as f64 + Shafts::bytes_a_shaft()) / MEGABYTE);
+    estimate.add("axons", axons * (BYTES_A_CONE as f64 + Shafts::bytes_a_shaft()) / MEGABYTE);
     estimate.add("mesh", vertices * SETTING_UP / MEGABYTE);
     estimate.summed()
 }

@@ -134,7 +134,7 @@ fn tips(roster: &Roster, method: &str, step: f64, axons: usize, pull: f64) -> Re
     let Some(mut cones) = world.try_query_filtered::<(&Position, &SpringState), With<GrowthCone>>() else {
         return Err(RunError::Internal("a scene of axons has no growth cones".into()));
     };
-    let tip = |(at, spring): (&Position, &SpringState)| ([at.0.x - 500.0, at.0.y - 500.0], spring.heading.x);
+    let tip = |(at, spring): (&Position, &SpringState)| ([at.0.x - 500.0, at.0.y - 500.0], spring.heading().x);
     Ok(cones.iter(world).map(tip).collect())
 }
 

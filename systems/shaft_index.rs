@@ -12,22 +12,23 @@
 //! every shaft, to the last bit.
 
 mod asking;
+mod expected;
 mod places;
 mod squares;
 
 pub use asking::Asking;
 
-use super::matrix::Loading;
+use crate::model::cones::ConeColumns;
 use crate::model::shafts::{BLOCK, Struck};
 use crate::numerics::locate::MaterialPoint;
 use crate::numerics::polylines::{Part, meeting};
 use crate::numerics::segments::Segments;
 use crate::prelude::*;
 use nalgebra::Vector2;
-use places::{BYTES_A_BLOCK, Line, Places};
+use places::{Line, Places};
 use rayon::prelude::*;
 use rstar::primitives::GeomWithData;
-use rstar::{AABB, RTree, RTreeNode};
+use rstar::{AABB, RTree};
 use squares::{Listed, Square, Squares, corners, name, part_of, parts_near, square, squares_near, unname};
 use std::ops::Range;
 
@@ -45,6 +46,8 @@ const ABOUT_A_CONE: usize = 256;
 /// Cones that are served together: few enough for what they look at to stay in the processor's caches, many enough that little is
 /// looked at by two batches.
 const BATCH: usize = 4096;
+/// Batches that are served at a time, in parallel.
+const BATCHES: usize = 64;
 /// Cones that one task serves: few enough to spread a crowded square over threads.
 const TASK: usize = 32;
 
@@ -99,7 +102,6 @@ pub struct ShaftIndex {
     radius: f64,
     squares: Squares,
     everything: Vec<Listed>,
-    places: Places,
 }
 
 impl ShaftIndex {
@@ -119,7 +121,7 @@ impl ShaftIndex {
                 index.search = index.search.max(search);
             }
             None => {
-                tell(model, reach, search);
+                expected::tell(model, reach, search);
                 let mut shafts = model.world.resource_mut::<Shafts>();
                 shafts.watch();
                 let longest = shafts.longest;
@@ -148,22 +150,11 @@ impl ShaftIndex {
         });
         order.par_sort_unstable();
         self.prepare(scene, &order);
-        for batch in order.chunks(BATCH) {
-            let groups = self.place(scene, batch);
+        for round in order.chunks(BATCHES * BATCH) {
             let columns = cones.columns();
-            let serve = |(asking, segments, met, work): &mut Desk<S>, task: &[Group]| -> Vec<_> {
-                let mut found = Vec::with_capacity(TASK);
-                for group in task {
-                    asking.clear();
-                    asking.extend(group.seats.iter().map(|seat| Asking::of(columns.at(seat.cone as usize))));
-                    self.gather(&group.near, asking, (segments, met));
-                    found.extend(asking.iter().map(|cone| (cone.index as usize, act(work, cone, segments))));
-                }
-                found
-            };
-            let tasks = groups.par_chunk_by(|a, b| a.task == b.task).map_init(Default::default, serve);
-            let tasks: Vec<Vec<(usize, T)>> = tasks.collect();
-            cones.apply_at(tasks.into_iter().flatten(), &write);
+            let serve = |places: &mut Places, batch: &[Seat]| self.serve((scene, &columns), batch, places, &act);
+            let found: Vec<Vec<(usize, T)>> = round.par_chunks(BATCH).map_init(Places::default, serve).collect();
+            cones.apply_at(found.into_iter().flatten(), &write);
         }
         order.len()
     }
@@ -187,9 +178,36 @@ impl ShaftIndex {
         }
     }
 
+    /// What `act` makes of what is near the cones of a batch, with their places among all cones.
+    fn serve<S: Default + Send, T: Send>(
+        &self,
+        (scene, columns): (&ShaftScene, &ConeColumns),
+        batch: &[Seat],
+        places: &mut Places,
+        act: &(impl Fn(&mut S, &Asking, &Segments<2>) -> T + Sync),
+    ) -> Vec<(usize, T)> {
+        let groups = self.place(scene, batch, places);
+        let places = &*places;
+        let serve = |(asking, segments, met, work): &mut Desk<S>, task: &[Group]| -> Vec<_> {
+            let mut found = Vec::with_capacity(TASK);
+            for group in task {
+                asking.clear();
+                asking.extend(group.seats.iter().map(|&Seat { cone, .. }| {
+                    let (population, bearing) = (scene.populations.0[cone as usize], columns.bearing(cone as usize));
+                    Asking::new(cone, population, bearing)
+                }));
+                self.gather((places, &group.near), asking, (segments, met));
+                found.extend(asking.iter().map(|cone| (cone.index as usize, act(work, cone, segments))));
+            }
+            found
+        };
+        let tasks = groups.par_chunk_by(|a, b| a.task == b.task).map_init(Default::default, serve);
+        let tasks: Vec<Vec<(usize, T)>> = tasks.collect();
+        tasks.into_iter().flatten().collect()
+    }
+
     /// Finds where everything is that a batch looks at; returns its cones in groups, each with its share of that.
-    fn place<'a>(&mut self, scene: &ShaftScene, batch: &'a [Seat]) -> Vec<Group<'a>> {
-        let mut places = std::mem::take(&mut self.places);
+    fn place<'a>(&self, scene: &ShaftScene, batch: &'a [Seat], places: &mut Places) -> Vec<Group<'a>> {
         places.begin(scene);
         let everything = (self.search == Search::All).then(|| places.note(listed(&self.everything, u16::MAX)));
         let mut groups = Vec::with_capacity(batch.len());
@@ -203,7 +221,6 @@ impl ShaftIndex {
             }
         }
         places.find(scene);
-        self.places = places;
         groups
     }
 
@@ -223,9 +240,10 @@ impl ShaftIndex {
         self.squares.clear();
         if self.search == Search::Grid {
             let shafts = &scene.shafts;
-            for vertex in (0..shafts.block_count() as u32).flat_map(|block| shafts.block_vertices(block)) {
-                self.put((vertex, scene.reference(shafts.point(vertex).into())), shafts.longest);
-            }
+            let blocks = 0..shafts.block_count() as u32;
+            let all: Vec<VertexId> = blocks.flat_map(|block| shafts.block_vertices(block)).collect();
+            let placed = placed(&scene.tissue, shafts, &all);
+            self.squares.put(&placed, self.radius + shafts.longest, self.side());
         }
     }
 
@@ -239,22 +257,27 @@ impl ShaftIndex {
     }
 
     /// The segments of what may be near that come near any of some cones.
-    fn gather(&self, near: &Range<usize>, cones: &[Asking], (segments, met): (&mut Segments<2>, &mut Vec<Part>)) {
+    fn gather(
+        &self,
+        (places, near): (&Places, &Range<usize>),
+        cones: &[Asking],
+        (segments, met): (&mut Segments<2>, &mut Vec<Part>),
+    ) {
         let positions = || cones.iter().map(|cone| cone.position.xy());
         let low = positions().fold(Vector2::repeat(f64::INFINITY), |m, x| m.inf(&x)).add_scalar(-self.reach);
         let high = positions().fold(Vector2::repeat(f64::NEG_INFINITY), |m, x| m.sup(&x)).add_scalar(self.reach);
-        let near = self.places.noted(near).iter().copied();
+        let near = places.noted(near).iter().copied();
         segments.clear();
         match self.search {
             Search::All => {
                 met.clear();
                 met.extend(near);
             }
-            Search::Grid | Search::Tree => meeting(self.places.lines(), near, [low, high], met),
+            Search::Grid | Search::Tree => meeting(places.lines(), near, [low, high], met),
         }
         for &(number, vertices) in met.iter() {
-            let [x, y] = &self.places.lines()[number as usize];
-            let owner = self.places.owner(number);
+            let [x, y] = &places.lines()[number as usize];
+            let owner = places.owner(number);
             let mut rest = vertices;
             while rest != 0 {
                 let i = rest.trailing_zeros() as usize;
@@ -264,25 +287,22 @@ impl ShaftIndex {
         }
     }
 
-    fn add(&mut self, vertex: VertexId, at: [f64; 2], longest: f64) {
+    /// Adds vertices at reference positions (µm).
+    fn add(&mut self, vertices: &[(VertexId, [f64; 2])], longest: f64) {
+        let (margin, side) = (self.radius + longest, self.side());
         match self.search {
             Search::All => {}
-            Search::Grid => self.put((vertex, at), longest),
+            Search::Grid => self.squares.put(vertices, margin, side),
             Search::Tree => {
-                self.tree.insert(Entry::new(at, vertex));
-                for (square, parts) in squares_near(at, self.radius + longest, self.side()) {
-                    if let Some(list) = self.squares.get_mut(square) {
-                        name(list, vertex, parts);
+                for &(vertex, at) in vertices {
+                    self.tree.insert(Entry::new(at, vertex));
+                    for (square, parts) in squares_near(at, margin, side) {
+                        if let Some(list) = self.squares.get_mut(square) {
+                            name(list, vertex, parts);
+                        }
                     }
                 }
             }
-        }
-    }
-
-    /// Puts a vertex at a reference position (µm) into the lists of all squares that it may be near to.
-    fn put(&mut self, (vertex, at): (VertexId, [f64; 2]), longest: f64) {
-        for (square, parts) in squares_near(at, self.radius + longest, self.side()) {
-            name(self.squares.make(square), vertex, parts);
         }
     }
 
@@ -301,54 +321,6 @@ impl ShaftIndex {
 /// Blocks of a list that may be near to some parts of its square, with the vertices that are meant.
 fn listed(list: &[Listed], parts: u16) -> impl Iterator<Item = Part> + '_ {
     list.iter().filter(move |listed| listed.parts & parts != 0).map(|listed| (listed.block, listed.vertices))
-}
-
-/// Parts of lists that a stored vertex takes, with the room in them. Ours, measured.
-const LISTED: f64 = 4.0;
-/// Room in the nodes of the tree over what stands in them. Ours, measured.
-const SLACK: f64 = 1.5;
-
-/// Says what the index holds and what looking `reach` far (µm) costs.
-fn tell(model: &mut ModelBuilder, reach: f64, search: Search) {
-    let entries = match search {
-        Search::All => 0.0,
-        Search::Grid => LISTED * size_of::<Listed>() as f64,
-        Search::Tree => SLACK * size_of::<RTreeNode<Entry>>() as f64,
-    };
-    let bytes = entries + BYTES_A_BLOCK as f64 / BLOCK as f64;
-    let is_bounded = model.world.get_resource::<Loading>().is_none_or(Loading::is_bounded);
-    let looked_at = if is_bounded { 0 } else { model.world.resource::<Tissue>().mesh.cell_count() };
-    let even = evenly_spread(model.world, reach);
-    let mut plan = model.plan();
-    plan.hold(PART, bytes, Each::ShaftVertex);
-    plan.work(PART, Work::Indexed, 1.0, Each::ShaftVertex);
-    plan.work(PART, Work::DeformedCell, looked_at as f64, Each::Stage);
-    plan.work(PART, Work::Neighbourhood, 1.0, Each::ConeStage);
-    plan.work(PART, Work::EvenSegment, even, Each::ConeStage);
-}
-
-/// Even neighbours from which on axons that grow abreast are drawn into bundles, and how many times denser these become at most. Ours, measured.
-const BUNDLING: (f64, f64) = (4.2, 3.0);
-
-/// Segments within a square of half side `reach` (µm) about a cone, if half of the way of all axons lay before it and were evenly spread
-/// over the longer side of the box of all births, widened by the reach, times its shorter side and the way of one axon; and more where many
-/// grow abreast, which gather in bundles.
-fn evenly_spread(world: &mut World, reach: f64) -> f64 {
-    let mut origins = world.query_filtered::<&Site, With<GrowthCone>>();
-    let tissue = world.resource::<Tissue>();
-    let (mut low, mut high) = (Vector3::repeat(f64::INFINITY), Vector3::repeat(f64::NEG_INFINITY));
-    for origin in origins.iter(world) {
-        let at = tissue.reference_position(*origin);
-        (low, high) = (low.inf(&at), high.sup(&at));
-    }
-    let shafts = world.resource::<Shafts>();
-    let clock = world.resource::<Clock>();
-    let fastest = world.resource::<Populations>().0.iter().map(|population| population.speed).fold(0.0, f64::max);
-    let (extent, way) = (high - low, fastest * clock.grid.hours(clock.end));
-    let (width, depth) = (extent.max().max(0.0) + 2.0 * reach, extent.x.min(extent.y).max(0.0));
-    let abreast = if way > 0.0 { way / (depth + way) } else { 1.0 };
-    let even = 0.5 * shafts.count() as f64 / width * (2.0 * reach).powi(2) / shafts.mean_segment() * abreast;
-    even * (1.0 + abreast * ((even / BUNDLING.0).clamp(1.0, BUNDLING.1) - 1.0))
 }
 
 /// All vertices within a margin of a square, ascending.
@@ -408,10 +380,7 @@ impl ShaftScene<'_> {
 fn index_again(world: &mut World) {
     world.resource_scope::<ShaftIndex, _>(|world, mut index| {
         let (tissue, shafts) = (world.resource::<Tissue>(), world.resource::<Shafts>());
-        for vertex in shafts.taken() {
-            let at = tissue.reference_position(shafts.point(vertex).into());
-            index.add(vertex, [at.x, at.y], shafts.longest);
-        }
+        index.add(&placed(tissue, shafts, &shafts.taken().collect::<Vec<_>>()), shafts.longest);
     });
 }
 
@@ -425,9 +394,16 @@ fn index_new_vertices(
         let at = tissue.reference_position(point.into());
         index.forget(vertex, [at.x, at.y], shafts.longest);
     }
-    for vertex in shafts.take_laid() {
+    let laid = shafts.take_laid();
+    index.add(&placed(&tissue, &shafts, &laid), shafts.longest);
+    counters.indexed_segments += laid.len() as u64;
+}
+
+/// Vertices with their reference positions (µm).
+fn placed(tissue: &Tissue, shafts: &Shafts, vertices: &[VertexId]) -> Vec<(VertexId, [f64; 2])> {
+    let place = |&vertex: &VertexId| {
         let at = tissue.reference_position(shafts.point(vertex).into());
-        index.add(vertex, [at.x, at.y], shafts.longest);
-        counters.indexed_segments += 1;
-    }
+        (vertex, [at.x, at.y])
+    };
+    vertices.par_iter().with_min_len(TASK).map(place).collect()
 }

@@ -320,6 +320,8 @@ fn a_folder_that_may_only_be_read_is_refused_at_the_start() {
 fn a_folder_that_vanishes_is_made_again_and_the_results_are_whole() {
     let mut long = scene();
     long["time"]["duration"] = json!(40);
+    long["output"]["tables"] = json!("both");
+    long["output"]["axons"] = json!({ "interval": 4 });
     let folder = with_scene(&long);
     let child = Command::new(env!("CARGO_BIN_EXE_tropism"))
         .args(["scene.json", "--checkpoint", "0s"])
@@ -336,6 +338,7 @@ fn a_folder_that_vanishes_is_made_again_and_the_results_are_whole() {
     let output = child.wait_with_output().unwrap();
     assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
     demand_whole_files(&out);
+    assert!(["trajectories", "axons"].iter().all(|name| out.join(format!("{name}.parquet")).exists()));
     assert_eq!(json_at(&out.join("summary.json"))["complete"], json!(true));
 }
 

@@ -29,6 +29,12 @@ struct Interval<const N: usize> {
     increment: [f64; N],
 }
 
+/// Increment over the left (0) or right (1) half of an interval with this increment and length, by the Brownian bridge.
+fn half_of<const N: usize>((whole, length): ([f64; N], f64), z: [f64; N], side: u64) -> [f64; N] {
+    let bridge = 0.5 * length.sqrt() * if side == 0 { 1.0 } else { -1.0 };
+    std::array::from_fn(|i| 0.5 * whole[i] + bridge * z[i])
+}
+
 /// The Brownian paths of headings; absent in a scene without heading diffusion.
 #[derive(Debug, Clone, Copy, Resource)]
 pub struct HeadingPaths(pub BrownianTree);
@@ -47,12 +53,27 @@ impl BrownianTree {
             return sum;
         }
         for root in from >> ROOT_LEVEL..to.div_ceil(1 << ROOT_LEVEL) {
-            let length = self.tick * 2f64.powi(ROOT_LEVEL as i32);
-            let scale = length.sqrt();
-            let increment = self.normals::<N>(axon, ROOT_LEVEL, root).map(|z| scale * z);
-            self.add_part(axon, (from, to), Interval { level: ROOT_LEVEL, index: root, length, increment }, &mut sum);
+            let (from, to) = (from.max(root << ROOT_LEVEL), to.min((root + 1) << ROOT_LEVEL));
+            // The smallest interval that holds the span.
+            let level = u64::BITS - (from ^ (to - 1)).leading_zeros();
+            self.add_part(axon, (from, to), self.interval(axon, level, from >> level), &mut sum);
         }
         sum
+    }
+
+    /// The interval `index` of 2^level ticks, from its root down.
+    fn interval<const N: usize>(&self, axon: u32, level: u32, index: u64) -> Interval<N> {
+        let root = index >> (ROOT_LEVEL - level);
+        let mut length = self.tick * 2f64.powi(ROOT_LEVEL as i32);
+        let scale = length.sqrt();
+        let mut increment = self.normals::<N>(axon, ROOT_LEVEL, root).map(|z| scale * z);
+        for below in (level..ROOT_LEVEL).rev() {
+            let child = index >> (below - level);
+            let z = self.normals::<N>(axon, below, child >> 1);
+            increment = half_of((increment, length), z, child & 1);
+            length *= 0.5;
+        }
+        Interval { level, index, length, increment }
     }
 
     /// Adds the increment over what an interval and a span of ticks have in common, which is something: its own, or those of its halves.
@@ -67,8 +88,7 @@ impl BrownianTree {
         let middle = start + (1 << (level - 1));
         for (side, is_met) in [(0, span.0 < middle), (1, middle < span.1)] {
             if is_met {
-                let bridge = 0.5 * length.sqrt() * if side == 0 { 1.0 } else { -1.0 };
-                let increment = std::array::from_fn(|i| 0.5 * increment[i] + bridge * z[i]);
+                let increment = half_of((increment, length), z, side);
                 let half = Interval { level: level - 1, index: 2 * index + side, length: 0.5 * length, increment };
                 self.add_part(axon, span, half, sum);
             }

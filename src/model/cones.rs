@@ -1,6 +1,7 @@
 //! How a mechanism meets the growth cones: one view of each that is growing, and the spring state it may add to.
 
 use super::components::{GrowthCone, Position, ReceptorWeights, Site, Spring, SpringState, Status};
+use super::tissue::lift;
 use bevy_ecs::prelude::{Component, Query, With};
 use bevy_ecs::system::SystemParam;
 use nalgebra::Vector3;
@@ -132,13 +133,26 @@ fn of_table<'a>(first: usize, table: &Table<'a>, i: usize) -> (Cone<'a>, Spring)
 /// All growth cones, to be looked at by place.
 pub struct ConeColumns<'a>(Vec<(usize, Table<'a>)>);
 
-impl<'a> ConeColumns<'a> {
-    /// The cone at a place that some view of a cone [named](Cone::index), and its spring state.
+/// Where a growth cone is, and which way it heads.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Bearing {
+    /// Material site.
+    pub site: Site,
+    /// Position (µm).
+    pub position: Vector3<f64>,
+    /// Unit heading.
+    pub heading: Vector3<f64>,
+}
+
+impl ConeColumns<'_> {
+    /// The bearing of the cone at a place that some view of it [named](Cone::index). Nothing else of it is looked at: cones that lie apart in
+    /// memory are waited for.
     #[inline]
-    pub fn at(&self, index: usize) -> (Cone<'a>, Spring) {
+    pub fn bearing(&self, index: usize) -> Bearing {
         let table = self.0.partition_point(|(first, _)| *first <= index) - 1;
-        let (first, table) = &self.0[table];
-        of_table(*first, table, index - first)
+        let (first, (_, _, sites, positions, _, springs)) = &self.0[table];
+        let i = index - first;
+        Bearing { site: sites[i], position: positions[i].in_space(), heading: lift(springs[i].heading().into()) }
     }
 }
 

@@ -14,13 +14,19 @@ use crate::kept;
 use crate::numerics::locate::MaterialPoint;
 use bevy_ecs::prelude::Resource;
 use blocks::{Block, Blocks};
+use rayon::prelude::*;
 
 /// Vertices a block.
 pub const BLOCK: usize = 8;
+/// Shafts that one task extends.
+const SHAFTS_A_TASK: usize = 256;
 const NONE: u32 = u32::MAX;
 
 /// Number of a stored vertex: its place among those that all blocks have room for.
 pub type VertexId = u32;
+
+/// A site and its reference position (µm).
+type Placed = (Site, [f64; 2]);
 
 /// What follows a stored vertex along its shaft.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -51,6 +57,14 @@ impl Chain {
 
     fn tip(&self) -> Site {
         Site { cell: self.tip_cell, weights: self.tip_weights }
+    }
+
+    /// Moves the tip on, unless a vertex has to be stored first; returns whether it did. `limits` are the tolerance and the longest segment.
+    fn reach(&mut self, (site, at): Placed, time: f64, limits: (f64, f64)) -> bool {
+        let Some(end) = self.end.widened(at, limits.0, limits.1) else { return false };
+        self.end = end;
+        self.put_tip(site, time as f32);
+        true
     }
 
     fn put_tip(&mut self, site: Site, time: f32) {
@@ -89,6 +103,17 @@ pub struct Struck {
 }
 
 kept! { struct Struck { vertex, point } }
+
+/// Where the tip of a shaft goes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Onward {
+    /// It stays.
+    Nowhere,
+    /// To a site, whose reference position (µm) is given too.
+    To(Site, [f64; 2]),
+    /// Nobody knows.
+    Lost,
+}
 
 /// A point of a shaft that is laid anew: its site, and when the cone passed it (h).
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -174,19 +199,43 @@ impl Shafts {
 
     /// Moves the tip of a shaft on to a site whose reference position is `at` (µm); stores the former tip when the chord to the
     /// new one would leave the tolerance or grow too long. `reference` is asked for the reference position of the former one then.
-    pub fn extend(
+    pub fn extend(&mut self, shaft: usize, (site, at): Placed, time: f64, reference: impl FnOnce(Site) -> [f64; 2]) {
+        if !self.chains[shaft].reach((site, at), time, (self.tolerance, self.longest)) {
+            self.bend(shaft, (site, at), time, reference);
+        }
+    }
+
+    /// [Extends](Self::extend) each shaft as `next` says from its number, its tip and its own of `with`; returns the first of those that are lost.
+    /// In parallel, but for the shafts that store a vertex, which follow in their order.
+    pub fn extend_each<T: Send>(
         &mut self,
-        shaft: usize,
-        (site, at): (Site, [f64; 2]),
         time: f64,
-        reference: impl FnOnce(Site) -> [f64; 2],
-    ) {
-        let chain = self.chains[shaft];
-        self.chains[shaft].end = chain.end.widened(at, self.tolerance, self.longest).unwrap_or_else(|| {
-            self.push(shaft, chain.tip(), chain.tip_time);
-            OpenEnd::chord(reference(chain.tip()), at, self.tolerance, self.longest)
+        with: &mut [T],
+        next: impl Fn(usize, Site, &mut T) -> Onward + Sync,
+        reference: impl Fn(Site) -> [f64; 2],
+    ) -> Option<usize> {
+        let limits = (self.tolerance, self.longest);
+        let chains = self.chains.par_iter_mut().zip(with).enumerate().with_min_len(SHAFTS_A_TASK);
+        let bent = chains.filter_map(|(shaft, (chain, own))| match next(shaft, chain.tip(), own) {
+            Onward::Nowhere => None,
+            Onward::Lost => Some((shaft, None)),
+            Onward::To(site, at) => (!chain.reach((site, at), time, limits)).then_some((shaft, Some((site, at)))),
         });
-        self.chains[shaft].put_tip(site, time as f32);
+        let bent: Vec<(usize, Option<Placed>)> = bent.collect();
+        for (shaft, to) in &bent {
+            to.iter().for_each(|to| self.bend(*shaft, *to, time, &reference));
+        }
+        bent.iter().find(|(_, to)| to.is_none()).map(|(shaft, _)| *shaft)
+    }
+
+    /// Stores the tip of a shaft, and moves on from there.
+    fn bend(&mut self, shaft: usize, (site, at): Placed, time: f64, reference: impl FnOnce(Site) -> [f64; 2]) {
+        let chain = self.chains[shaft];
+        self.push(shaft, chain.tip(), chain.tip_time);
+        let chain_end = OpenEnd::chord(reference(chain.tip()), at, self.tolerance, self.longest);
+        let chain = &mut self.chains[shaft];
+        chain.end = chain_end;
+        chain.put_tip(site, time as f32);
     }
 
     fn push(&mut self, shaft: usize, site: Site, time: f32) {

@@ -243,3 +243,16 @@ fn length(tissue: &Tissue, facet: BorderFacet) -> f64 {
     let ends: Vec<_> = tissue.mesh.facet_vertices(facet).map(|v| tissue.mesh.vertices()[v as usize]).collect();
     (ends[1][0] - ends[0][0]).hypot(ends[1][1] - ends[0][1])
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_growth_cone_takes_265_bytes() {
+        let components = size_of::<GrowthCone>() + size_of::<Status>() + size_of::<Site>() + size_of::<Position>();
+        let vectors = size_of::<Velocity>() + size_of::<SpringState>();
+        let rest = size_of::<ReceptorWeights>() + size_of::<Journey>();
+        assert_eq!(components + vectors + rest + BYTES_A_STEP, 265);
+    }
+}

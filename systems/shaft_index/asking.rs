@@ -1,5 +1,6 @@
 //! A cone that looks at shafts.
 
+use crate::model::cones::Bearing;
 use crate::numerics::contact_integral::Felt;
 use crate::numerics::segments::{ContactPull, Contacts, Segments};
 use crate::prelude::*;
@@ -20,16 +21,10 @@ pub struct Asking {
 }
 
 impl Asking {
-    /// A cone as it asks.
+    /// The cone at a place, of a population, as it asks.
     #[inline]
-    pub fn of((cone, spring): (Cone, Spring)) -> Self {
-        Self {
-            index: cone.index as u32,
-            population: cone.identity.population,
-            site: cone.site,
-            position: cone.position,
-            heading: spring.heading,
-        }
+    pub fn new(index: u32, population: u16, Bearing { site, position, heading }: Bearing) -> Self {
+        Self { index, population, site, position, heading }
     }
 
     /// What the cone makes of segments other than its own by a law, times its adhesion to their kinds.

@@ -41,7 +41,11 @@ pub struct Places {
 impl Places {
     /// Forgets what was noted.
     pub fn begin(&mut self, scene: &ShaftScene) {
-        self.numbers.resize(scene.shafts.block_count(), 0);
+        let blocks = scene.shafts.block_count();
+        if self.numbers.len() != blocks {
+            // Zeros that the system gives when they are looked at: most never are.
+            self.numbers = vec![0; blocks];
+        }
         self.blocks.clear();
         self.parts.clear();
     }

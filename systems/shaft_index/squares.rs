@@ -5,6 +5,7 @@
 
 use crate::model::shafts::BLOCK;
 use crate::prelude::VertexId;
+use rayon::prelude::*;
 use std::collections::HashMap;
 use std::hash::{BuildHasherDefault, Hasher};
 
@@ -26,6 +27,34 @@ pub struct Squares {
 struct Tile {
     made: u64,
     lists: [Vec<Listed>; TILE],
+}
+
+impl Tile {
+    /// The list of the square at a place, from now on.
+    fn list(&mut self, place: usize) -> &mut Vec<Listed> {
+        self.made |= 1 << place;
+        &mut self.lists[place]
+    }
+}
+
+/// Vertices that are put into lists at a time.
+const ROUND: usize = 1 << 16;
+/// Vertices, and tiles, that are one task.
+const TASK: usize = 64;
+
+/// A vertex for the list of a square.
+#[derive(Debug, Clone, Copy, Default)]
+struct Named {
+    square: Square,
+    vertex: VertexId,
+    /// The parts of the square that it may be near to.
+    parts: u16,
+}
+
+/// Vertices for lists, tile after tile: those of the n-th stand from `starts[n]` to `starts[n + 1]`.
+struct ByTile {
+    named: Vec<Named>,
+    starts: Vec<u32>,
 }
 
 /// Place of a square's tile along the curve, and of the square in it.
@@ -81,14 +110,62 @@ impl Squares {
     /// The list of a square, from now on.
     pub fn make(&mut self, square: Square) -> &mut Vec<Listed> {
         let (tile, place) = tile_and_place(square);
+        let number = self.number(tile);
+        self.tiles[number].list(place)
+    }
+
+    /// The number of a tile, from now on.
+    fn number(&mut self, tile: u64) -> usize {
         let next = self.tiles.len() as u32;
         let number = *self.numbers.entry(tile).or_insert(next);
         if number == next {
             self.tiles.push(Tile { made: 0, lists: std::array::from_fn(|_| Vec::new()) });
         }
-        let tile = &mut self.tiles[number as usize];
-        tile.made |= 1 << place;
-        &mut tile.lists[place]
+        number as usize
+    }
+
+    /// Puts vertices with their places (µm) into the lists of all squares of side `side` (µm) that come nearer than `margin` to them: sorted by
+    /// tiles, which are then filled in parallel.
+    pub fn put(&mut self, vertices: &[(VertexId, [f64; 2])], margin: f64, side: f64) {
+        for round in vertices.chunks(ROUND) {
+            let near = |&(vertex, at): &(VertexId, [f64; 2])| {
+                squares_near(at, margin, side).map(move |(square, parts)| Named { square, vertex, parts })
+            };
+            let found: Vec<Named> = round.par_iter().with_min_len(TASK).flat_map_iter(near).collect();
+            let by_tile = self.sorted(&found);
+            let tiles = self.tiles.par_iter_mut().zip(by_tile.starts.par_windows(2));
+            tiles.with_min_len(TASK).for_each(|(tile, range)| {
+                for &Named { square, vertex, parts } in &by_tile.named[range[0] as usize..range[1] as usize] {
+                    name(tile.list(tile_and_place(square).1), vertex, parts);
+                }
+            });
+        }
+    }
+
+    /// What was found in the order of its tiles, which are made where they are missing.
+    fn sorted(&mut self, found: &[Named]) -> ByTile {
+        let mut last = None;
+        let mut number = |tile: u64| match last {
+            Some((known, number)) if known == tile => number,
+            _ => {
+                let number = self.number(tile);
+                last = Some((tile, number));
+                number
+            }
+        };
+        let numbers: Vec<u32> = found.iter().map(|named| number(tile_and_place(named.square).0) as u32).collect();
+        // Counting sort: where the next of each tile goes, which ends as where those of the next tile start.
+        let mut starts = vec![0; self.tiles.len() + 2];
+        numbers.iter().for_each(|&number| starts[number as usize + 2] += 1);
+        (2..starts.len()).for_each(|i| starts[i] += starts[i - 1]);
+        let mut named = vec![Named::default(); found.len()];
+        for (found, &number) in found.iter().zip(&numbers) {
+            let next: &mut u32 = &mut starts[number as usize + 1];
+            named[*next as usize] = *found;
+            *next += 1;
+        }
+        starts.pop();
+        ByTile { named, starts }
     }
 
     /// Forgets all lists.

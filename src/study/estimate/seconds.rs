@@ -1,7 +1,7 @@
 //! The estimate of time: CPU seconds of one thread for a whole run, what is solved before the first step included.
 //!
 //! Counts times the nanoseconds below, which were measured on the reference machine (two shared x86-64 cores, nothing beside) on 2026-11-24,
-//! those of contact in proportion to it on 2026-11-29. By how much another machine is slower or faster as a whole: [`yardstick`](super::yardstick).
+//! those of contact in proportion to it on 2026-11-30. By how much another machine is slower or faster as a whole: [`yardstick`](super::yardstick).
 
 use super::{Estimate, Expectation, done};
 use crate::model::observables::{Effect, Observables};
@@ -47,8 +47,8 @@ pub(super) fn unit(work: Work) -> f64 {
         Work::Sampled => 17.5,
         Work::BorderFacet => 0.09,
         Work::Neighbourhood => 800.0,
-        Work::EvenSegment => 55.0,
-        Work::Indexed => 480.0,
+        Work::EvenSegment => 51.0,
+        Work::Indexed => 240.0,
     }
 }
 

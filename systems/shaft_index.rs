@@ -102,6 +102,7 @@ pub struct ShaftIndex {
     radius: f64,
     squares: Squares,
     everything: Vec<Listed>,
+    places: Places,
 }
 
 impl ShaftIndex {
@@ -150,12 +151,17 @@ impl ShaftIndex {
         });
         order.par_sort_unstable();
         self.prepare(scene, &order);
+        let mut places = std::mem::take(&mut self.places);
         for round in order.chunks(BATCHES * BATCH) {
             let columns = cones.columns();
             let serve = |places: &mut Places, batch: &[Seat]| self.serve((scene, &columns), batch, places, &act);
-            let found: Vec<Vec<(usize, T)>> = round.par_chunks(BATCH).map_init(Places::default, serve).collect();
-            cones.apply_at(found.into_iter().flatten(), &write);
+            // Where there is one batch only, its work memory lasts.
+            let (first, others) = round.split_at(round.len().min(BATCH));
+            let others = others.par_chunks(BATCH).map_init(Places::default, serve);
+            let (first, others) = rayon::join(|| serve(&mut places, first), || others.collect::<Vec<_>>());
+            cones.apply_at(first.into_iter().chain(others.into_iter().flatten()), &write);
         }
+        self.places = places;
         order.len()
     }
 

@@ -244,7 +244,8 @@ fn demand_whole_files(out: &Path) {
         let (name, bytes) = (path.file_name().unwrap().to_string_lossy().into_owned(), std::fs::read(&path).unwrap());
         let whole = match name.as_str() {
             "summary.json" | "manifest.json" => serde_json::from_slice::<Value>(&bytes).is_ok(),
-            "trajectories.csv" => bytes.ends_with(b"\n"),
+            "trajectories.csv" | "axons.csv" => bytes.ends_with(b"\n"),
+            "trajectories.parquet" | "axons.parquet" => bytes.starts_with(b"PAR1") && bytes.ends_with(b"PAR1"),
             "figure.svg" => bytes.ends_with(b"</svg>\n") || bytes.ends_with(b"</svg>"),
             "figure.png" => bytes.ends_with(b"IEND\xaeB`\x82"),
             "checkpoint.bin" | "checkpoint.previous.bin" => {

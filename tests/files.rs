@@ -144,6 +144,7 @@ fn a_new_run_clears_all_files_of_an_earlier_one_and_nothing_else() {
     assert_eq!(names(out.join("swc")), ["0000", "0001", "0002"], "archives of the run before are gone");
     let mine = ["mine.csv", "swc/0001/mine.swc", "swc/axon_x.swc", "vtu/tissue/mine.vtu", "vtu/notes.txt"];
     mine.iter().for_each(|name| std::fs::write(out.join(name), "mine").unwrap());
+    std::fs::write(out.join(".trajectories.csv.partial"), "of a run that was killed").unwrap();
     std::fs::write(own.join("0000.vtu"), "mine").unwrap();
     std::fs::remove_dir_all(out.join("vtu/fields")).unwrap();
     std::os::unix::fs::symlink(&own, out.join("vtu/fields")).unwrap();

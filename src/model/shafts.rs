@@ -150,9 +150,12 @@ impl Shafts {
         Block::BYTES as f64 / BLOCK as f64
     }
 
-    /// Bytes that a shaft takes besides: its chain, and on average half a block that is not yet full.
-    pub fn bytes_a_shaft() -> f64 {
-        size_of::<Chain>() as f64 + 0.5 * BLOCK as f64 * Self::bytes_a_vertex()
+    /// Bytes of the head of a shaft, which stands ready from the start.
+    pub const BYTES_A_HEAD: usize = size_of::<Chain>();
+
+    /// Bytes that a shaft takes besides once it has begun: on average half a block that is not yet full.
+    pub fn bytes_a_begun_shaft() -> f64 {
+        0.5 * BLOCK as f64 * Self::bytes_a_vertex()
     }
 
     /// Number of shafts.

@@ -3,7 +3,7 @@
 //! Only names that a run writes are looked at, only in a folder with the manifest of a run, and no link is followed or removed.
 
 use super::checkpoint::{NAMES, is_checkpoint};
-use super::output::{WriteError, remove_if_there};
+use super::output::{WriteError, remove_if_there, temporary_beside};
 use crate::scenario::read::read_file;
 use serde_json::Value;
 use std::fs;
@@ -43,7 +43,10 @@ pub fn clear(folder: &Path, scenario: &Path) -> Result<(), WriteError> {
     }
     let [vtu, swc] = ["vtu", "swc"].map(|name| folder.join(name));
     for name in FILES.iter().filter(|name| !name.starts_with("vtu/") || is(&vtu, fs::Metadata::is_dir)) {
-        remove(&folder.join(name))?;
+        let path = folder.join(name);
+        remove(&path)?;
+        // Of a run that was killed while it wrote.
+        remove(&temporary_beside(&path))?;
     }
     if is(&vtu, fs::Metadata::is_dir) {
         for series in ["tissue", "fields", "shafts"] {

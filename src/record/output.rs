@@ -230,7 +230,7 @@ pub fn try_folder(folder: &Path) -> Result<(), WriteError> {
 }
 
 /// `folder/.name.partial` for `folder/name`.
-fn temporary_beside(path: &Path) -> PathBuf {
+pub fn temporary_beside(path: &Path) -> PathBuf {
     let mut name = OsString::from(".");
     name.push(path.file_name().unwrap_or_default());
     name.push(".partial");

@@ -312,10 +312,12 @@ fn plan(world: &mut World, loaded: &Loaded, roster: &Roster) {
     let extent = (high[0] - low[0]).min(high[1] - low[1]);
     let tissue = world.resource::<Tissue>();
     let configuration = 2 * size_of_val(tissue.mesh.vertices());
+    let cones = world.resource::<Shafts>().count();
     let mesh = (tissue.mesh.bytes() + configuration) as f64;
     let mut plan = world.resource_mut::<Plan>();
     plan.hold("mesh", mesh, Each::Run);
-    plan.hold("axons", populate::BYTES_A_CONE as f64 + Shafts::bytes_a_shaft(), Each::Axon);
+    plan.hold("axons", cones as f64 * (populate::BYTES_A_CONE + Shafts::BYTES_A_HEAD) as f64, Each::Run);
+    plan.hold("shafts", Shafts::bytes_a_begun_shaft(), Each::Axon);
     plan.hold("shafts", Shafts::bytes_a_vertex(), Each::ShaftVertex);
     for entry in roster.entries.iter().filter(|entry| !loaded.blocks.contains_key(entry.name)) {
         plan.leave_out(entry.name, "the scene has no such block");

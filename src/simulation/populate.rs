@@ -41,8 +41,14 @@ const LONGEST_SEGMENT: f64 = 12.0;
 /// What is known of a growth cone, besides what mechanisms attach.
 type ConeState = (GrowthCone, Status, Site, Position, Velocity, SpringState, ReceptorWeights, Journey);
 
-/// Bytes of a growth cone: its components, and what is kept of it during a step.
-pub const BYTES_A_CONE: usize = size_of::<ConeState>() + BYTES_A_STEP;
+/// Components of a growth cone, and bytes that the ECS keeps for each (two ticks) and for an entity. Of bevy_ecs 0.20.
+const COMPONENTS: usize = 8;
+const BYTES_A_COMPONENT: usize = 8;
+const BYTES_AN_ENTITY: usize = 48;
+
+/// Bytes of a growth cone: its components, what the ECS keeps for it, and what is kept of it during a step.
+pub const BYTES_A_CONE: usize =
+    size_of::<ConeState>() + COMPONENTS * BYTES_A_COMPONENT + BYTES_AN_ENTITY + BYTES_A_STEP;
 
 /// Entities kept free for the resources that come after the cones. A resource is an entity too, and is looked up in a list as long
 /// as the number of that entity: behind the cones it would take eight bytes of each for every resource.

@@ -13,8 +13,8 @@ use std::ops::Range;
 /// Positions now (µm) of a block's vertices, and of the point that the last of them leads to.
 pub type Line = Polyline<{ BLOCK + 1 }>;
 
-/// Bytes held for a block.
-pub const BYTES_A_BLOCK: usize = size_of::<Line>() + size_of::<Head>() + 2 * size_of::<u32>();
+/// Bytes held for a block: the number of its line. Lines and heads are those of a batch.
+pub const BYTES_A_BLOCK: usize = size_of::<u32>();
 
 /// What the shaft of a block is, and where it goes on.
 #[derive(Debug, Clone, Copy, PartialEq)]

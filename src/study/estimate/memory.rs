@@ -19,12 +19,16 @@ const PROGRAM: f64 = 9.5e6;
 pub(super) const SETTING_UP: f64 = 1100.0;
 /// A row of `trajectories.csv`, as it stands in memory until it goes to the disk (bytes).
 const ROW: f64 = 80.0;
-/// A shaft vertex in a snapshot, its panel and the drawing (bytes).
-const DRAWN_VERTEX: f64 = 48.0;
+/// A shaft vertex in a snapshot (bytes), and in its panel and the drawing.
+const SEEN_VERTEX: f64 = 18.0;
+const DRAWN_VERTEX: f64 = 30.0;
+/// What the process keeps of the memory of a run that is over (bytes).
+const NOT_GIVEN_BACK: f64 = 64e6;
 
 /// The peak of resident memory (MB) of a scene, and of its figure, if it has one.
 pub fn estimate(world: &World, expected: &Expectation, figure: Option<&PictureSize>) -> Estimate {
     let mut estimate = held(world.resource::<Plan>(), expected);
+    let given_back = (estimate.parts.iter().map(|part| part.amount).sum::<f64>() - NOT_GIVEN_BACK).max(0.0);
     let tissue = world.resource::<Tissue>();
     estimate.add("program", PROGRAM);
     estimate.add("mesh", SETTING_UP * tissue.mesh.vertex_count() as f64);
@@ -33,10 +37,12 @@ pub fn estimate(world: &World, expected: &Expectation, figure: Option<&PictureSi
     estimate.add("trajectories", most.min(ROW * expected.trajectory_points));
     estimate.add("recording", expected.recording_bytes);
     let drawing = figure.map_or(0.0, |figure| figure.bytes_to_draw() + DRAWN_VERTEX * expected.drawn_vertices);
-    // The recording as it is written is a second copy, which has gone when the figure is drawn: the larger of both counts.
+    estimate.add("figure", figure.map_or(0.0, |_| SEEN_VERTEX * expected.drawn_vertices));
+    // The recording as it is written is a second copy, which has gone when the figure is drawn, and cones, tissue and fields have gone before
+    // either: the largest counts.
     match drawing >= expected.recording_bytes {
-        true => estimate.add("figure", drawing),
-        false => estimate.add("recording", expected.recording_bytes),
+        true => estimate.add("figure", (drawing - given_back).max(0.0)),
+        false => estimate.add("recording", (expected.recording_bytes - given_back).max(0.0)),
     }
     estimate.parts.iter_mut().for_each(|part| part.amount /= MEGABYTE);
     estimate.summed()

@@ -15,7 +15,7 @@ pub fn outlook(scene: &Scene) -> Estimate {
     let axons: f64 = scene.populations.values().map(|population| population.count as f64).sum();
     let vertices = scene.tissue.expected_vertices().min(scene.tissue.max_vertices as f64);
     let mut estimate = Estimate::default();
-    estimate.add("axons", axons * (BYTES_A_CONE as f64 + Shafts::bytes_a_shaft()) / MEGABYTE);
+    estimate.add("axons", axons * (BYTES_A_CONE + Shafts::BYTES_A_HEAD) as f64 / MEGABYTE);
     estimate.add("mesh", vertices * SETTING_UP / MEGABYTE);
     estimate.summed()
 }

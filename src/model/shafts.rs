@@ -538,4 +538,36 @@ mod tests {
     fn the_head_of_a_shaft_takes_88_bytes() {
         assert_eq!(size_of::<Chain>(), 88);
     }
+
+    #[test]
+    fn shafts_extended_together_are_those_extended_one_by_one_and_the_first_lost_one_is_told() {
+        let at = |shaft: usize, step: usize| [step as f64, ((step * (shaft + 1)) as f64).sin()];
+        let begun = || {
+            let mut shafts = Shafts::new(40, 0.05, 6.0);
+            (0..40).for_each(|shaft| shafts.start(shaft, site(at(shaft, 0)), at(shaft, 0), 0.0));
+            shafts
+        };
+        let (mut together, mut apart, mut asked) = (begun(), begun(), [0; 40]);
+        for step in 1..60 {
+            let next = |shaft: usize, tip: Site, own: &mut usize| {
+                *own += 1;
+                match (shaft, step) {
+                    (7, _) => Onward::Nowhere,
+                    (9 | 30, 59) => Onward::Lost,
+                    _ => {
+                        assert_eq!(tip, site(at(shaft, step - 1)));
+                        Onward::To(site(at(shaft, step)), at(shaft, step))
+                    }
+                }
+            };
+            let lost = together.extend_each(step as f64, &mut asked, next, |before| before.weights);
+            assert_eq!(lost, (step == 59).then_some(9));
+            for shaft in (0..40).filter(|&shaft| shaft != 7 && (step < 59 || (shaft != 9 && shaft != 30))) {
+                apart.extend(shaft, (site(at(shaft, step)), at(shaft, step)), step as f64, |before| before.weights);
+            }
+        }
+        assert!(asked.iter().all(|&times| times == 59));
+        assert!((0..40).all(|shaft| together.polyline(shaft) == apart.polyline(shaft)));
+        assert!((0..together.block_count() as u32).all(|block| together.block_head(block) == apart.block_head(block)));
+    }
 }

@@ -343,4 +343,20 @@ mod tests {
         }
         assert_eq!(part_of([-1.0, -7.0], side), 1 << 3);
     }
+
+    #[test]
+    fn lists_that_are_filled_tile_by_tile_are_those_filled_one_by_one_in_any_order() {
+        let (margin, side) = (7.0, 10.0);
+        let at = |i: u32| [f64::from(i * 37 % 211) - 90.0, 1.3 * f64::from(i * 53 % 197) - 60.0];
+        let vertices: Vec<_> = (0..3000).map(|i| (i, at(i))).collect();
+        let (mut together, mut apart) = (Squares::default(), Squares::default());
+        together.put(&vertices[..2000], margin, side);
+        together.put(&vertices[2000..], margin, side);
+        for &(vertex, at) in vertices.iter().rev() {
+            squares_near(at, margin, side).for_each(|(square, parts)| name(apart.make(square), vertex, parts));
+        }
+        for (square, _) in vertices.iter().flat_map(|(_, at)| squares_near(*at, margin, side)) {
+            assert!(together.get(square).is_some() && together.get(square) == apart.get(square));
+        }
+    }
 }

@@ -122,6 +122,23 @@ mod tests {
     }
 
     #[test]
+    fn an_interval_of_any_ends_is_the_sum_of_its_ticks() {
+        let tree = tree();
+        for (from, to) in
+            [(0, 1), (5, 5), (1021, 1029), ((1 << 26) - 300, (1 << 26) + 5), ((2 << 30) - 7, (2 << 30) + 130)]
+        {
+            let whole: [f64; 2] = tree.increment(3, from, to);
+            let ticks = (from..to).map(|tick| tree.increment::<2>(3, tick, tick + 1));
+            let sum = ticks.fold([0.0; 2], |sum, tick| [sum[0] + tick[0], sum[1] + tick[1]]);
+            let size = (to - from) as f64 * tree.tick;
+            assert!(
+                (0..2).all(|i| (sum[i] - whole[i]).abs() <= 1e-11 * size.sqrt()),
+                "{from} to {to}: {sum:?} {whole:?}"
+            );
+        }
+    }
+
+    #[test]
     fn increments_have_the_variance_of_their_length_and_are_independent() {
         let tree = tree();
         let step = 1u64 << 26;

@@ -58,11 +58,11 @@ impl BirthQueue {
         due
     }
 }
+
 /// Inner unit normal of a face of a cell, opposite its local vertex `face`.
 fn inner_normal(tissue: &Tissue, coordinates: &impl AtVertices<2>, cell: u32, face: u8) -> Vector3<f64> {
-    let corners = tissue.mesh.cell(cell as usize);
-    let [from, to] = [1, 2].map(|k| coordinates.at(corners[(usize::from(face) + k) % 3] as usize));
-    let along = [to[0] - from[0], to[1] - from[1]];
+    let ends: Vec<_> = tissue.mesh.face_vertices(cell, face).map(|v| coordinates.at(v as usize)).collect();
+    let along = [ends[1][0] - ends[0][0], ends[1][1] - ends[0][1]];
     let length = along[0].hypot(along[1]);
     Vector3::new(-along[1] / length, along[0] / length, 0.0)
 }
@@ -83,7 +83,7 @@ impl Altered<'_> {
         *self.status = Status::Growing;
         (*self.site, self.position.0) = (site, position.xy());
         self.velocity.growth = heading.xy() * speed;
-        *self.spring = Spring::heading_along(heading).into();
+        *self.spring = Spring { heading, ..Spring::default() }.into();
         (self.journey.first_heading, self.journey.ended) = (heading.xy().into(), hours);
     }
 }

@@ -155,7 +155,7 @@ kept! { struct SpringState { heading, drift, pull, speed_factor, heading_diffusi
 
 impl Default for SpringState {
     fn default() -> Self {
-        Spring::heading_along(Vector3::zeros()).into()
+        Spring::default().into()
     }
 }
 
@@ -224,11 +224,10 @@ pub struct Spring {
     pub spin: Vector3<f64>,
 }
 
-impl Spring {
-    /// At rest, with a unit heading.
-    pub fn heading_along(heading: Vector3<f64>) -> Self {
+impl Default for Spring {
+    fn default() -> Self {
         Self {
-            heading,
+            heading: Vector3::zeros(),
             drift: 1.0,
             pull: Vector3::zeros(),
             speed_factor: 1.0,
@@ -236,7 +235,9 @@ impl Spring {
             spin: Vector3::zeros(),
         }
     }
+}
 
+impl Spring {
     /// Clears what mechanisms add to, before a stage.
     pub fn clear(&mut self) {
         self.pull = Vector3::zeros();

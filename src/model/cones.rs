@@ -1,7 +1,6 @@
 //! How a mechanism meets the growth cones: one view of each that is growing, and the spring state it may add to.
 
 use super::components::{GrowthCone, Position, ReceptorWeights, Site, Spring, SpringState, Status};
-use super::tissue::lift;
 use bevy_ecs::prelude::{Component, Query, With};
 use bevy_ecs::system::SystemParam;
 use nalgebra::Vector3;
@@ -152,7 +151,7 @@ impl ConeColumns<'_> {
         let table = self.0.partition_point(|(first, _)| *first <= index) - 1;
         let (first, (_, _, sites, positions, _, springs)) = &self.0[table];
         let i = index - first;
-        Bearing { site: sites[i], position: positions[i].in_space(), heading: lift(springs[i].heading().into()) }
+        Bearing { site: sites[i], position: positions[i].in_space(), heading: springs[i].seen().heading }
     }
 }
 

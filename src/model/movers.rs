@@ -47,7 +47,7 @@ struct Besides {
 }
 
 /// What the stages of an explicit method found.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Stages {
     /// |v_g| over its nominal value at the start.
     pub(super) drift: f64,
@@ -61,20 +61,6 @@ pub(super) struct Stages {
     /// Halvings of the clock's step that the cone takes, and the instant (ticks) it has come to.
     pub(super) level: u8,
     pub(super) reached: u64,
-}
-
-impl Default for Stages {
-    fn default() -> Self {
-        Self {
-            drift: 1.0,
-            rates: Default::default(),
-            unkicked: Vector3::zeros(),
-            sampled: Spring::heading_along(Vector3::zeros()),
-            error: 0.0,
-            level: 0,
-            reached: 0,
-        }
-    }
 }
 
 impl StepStart {

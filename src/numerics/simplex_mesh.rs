@@ -215,9 +215,13 @@ impl<const D: usize> SimplexMesh<D> {
     /// The `D` vertices of a border facet, in the order they have in their cell (for `D = 2` so that the domain lies to the
     /// left of first → last, for either face).
     pub fn facet_vertices(&self, facet: BorderFacet) -> impl Iterator<Item = u32> + '_ {
-        let corners = self.cell(facet.cell as usize);
-        let face = facet.face as usize;
-        (1..Self::STRIDE).map(move |k| corners[(face + k) % Self::STRIDE])
+        self.face_vertices(facet.cell, facet.face)
+    }
+
+    /// The same of a face of a cell, by the local vertex opposite to it.
+    pub fn face_vertices(&self, cell: u32, face: u8) -> impl Iterator<Item = u32> + '_ {
+        let corners = self.cell(cell as usize);
+        (1..Self::STRIDE).map(move |k| corners[(face as usize + k) % Self::STRIDE])
     }
 
     /// Edge vectors of a cell from its vertex 0: column `i` is `x_{i+1} − x_0` (µm), at the given coordinates.

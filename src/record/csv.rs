@@ -167,10 +167,7 @@ impl CsvTable {
     fn relieve(&mut self) {
         let Some(stream) = self.stream.as_mut().filter(|stream| !stream.is_refused) else { return };
         if self.text.len() > stream.in_memory {
-            let file = match stream.file.take() {
-                Some(file) => Ok(file),
-                None => Partial::create(&stream.path),
-            };
+            let file = stream.file.take().map_or_else(|| Partial::create(&stream.path), Ok);
             let written = file.and_then(|file| stream.file.insert(file).write(self.text.as_bytes()));
             stream.is_refused = written.is_err();
             if written.is_ok() {

@@ -54,20 +54,6 @@ pub const BYTES_A_CONE: usize =
 /// as the number of that entity: behind the cones it would take eight bytes of each for every resource.
 const ROOM_FOR_RESOURCES: usize = 256;
 
-/// Where a growth cone is born, and which way it heads.
-struct Origin {
-    site: Site,
-    heading: FirstHeading,
-}
-
-/// The heading a cone is born with.
-enum FirstHeading {
-    /// Along the inner normal of a face of its cell.
-    InnerNormal(u8),
-    /// A unit vector.
-    Fixed(Vector3<f64>),
-}
-
 /// Spawns growth cones, with `spares` more for each axon after those of all axons; returns them in order.
 pub(super) fn spawn_cones(world: &mut World, scene: &Scene, spares: u32) -> Result<Vec<Entity>, AssemblyError> {
     let room: Vec<Entity> = (0..ROOM_FOR_RESOURCES).map(|_| world.spawn_empty().id()).collect();
@@ -80,13 +66,10 @@ pub(super) fn spawn_cones(world: &mut World, scene: &Scene, spares: u32) -> Resu
         for _ in 0..keys.count {
             let number = cones.len() as u32;
             let birth = birth_instant(world, scene, keys, number);
-            let origin = places.origin(world.resource::<Tissue>(), scene.seed, number);
-            let (face, heading) = match origin.heading {
-                FirstHeading::InnerNormal(face) => (Some(face), Vector3::zeros()),
-                FirstHeading::Fixed(heading) => (None, heading),
-            };
+            let (site, facet) = places.origin(world.resource::<Tissue>(), scene.seed, number);
+            let (face, heading) = places.first_heading(scene.seed, number, facet);
             let identity = GrowthCone { axon: number, population: index as u16, speed: keys.speed.0, birth };
-            cones.push(spawn(world, identity, origin.site, Spring::heading_along(heading).into()));
+            cones.push(spawn(world, identity, site, Spring { heading, ..Spring::default() }.into()));
             births.push(Birth { instant: birth, cone: number, face });
             of_shaft.push(index as u16);
         }
@@ -192,9 +175,10 @@ impl Places {
         Ok(Self { place, heading: keys.heading })
     }
 
-    fn origin(&self, tissue: &Tissue, seed: u64, number: u32) -> Origin {
+    /// Where a cone is born, and on which facet of the border, if on any.
+    fn origin(&self, tissue: &Tissue, seed: u64, number: u32) -> (Site, Option<BorderFacet>) {
         let mut draws = KeyedRng::new(seed, number, BIRTHS, WHERE);
-        let (site, facet) = match &self.place {
+        match &self.place {
             Place::Points(sites) => (sites[number as usize % sites.len()], None),
             Place::Edge { facets, from, to } => {
                 let share: f64 = draws.random();
@@ -212,15 +196,15 @@ impl Places {
                 let weights = if a + b > 1.0 { [1.0 - a, 1.0 - b] } else { [a, b] };
                 (Site { cell: cell as u32, weights }, None)
             }
-        };
-        Origin { site, heading: self.first_heading(seed, number, facet) }
+        }
     }
 
-    fn first_heading(&self, seed: u64, number: u32, facet: Option<BorderFacet>) -> FirstHeading {
-        let fixed = |angle: f64| FirstHeading::Fixed(Vector3::new(angle.cos(), angle.sin(), 0.0));
+    /// The face of its cell along whose inner normal a cone heads at birth, or its heading.
+    fn first_heading(&self, seed: u64, number: u32, facet: Option<BorderFacet>) -> (Option<u8>, Vector3<f64>) {
+        let fixed = |angle: f64| (None, Vector3::new(angle.cos(), angle.sin(), 0.0));
         match (self.heading, facet) {
             (Heading::Angle(angle), _) => fixed(angle.radians()),
-            (Heading::Along(Direction::InnerNormal), Some(facet)) => FirstHeading::InnerNormal(facet.face),
+            (Heading::Along(Direction::InnerNormal), Some(facet)) => (Some(facet.face), Vector3::zeros()),
             (Heading::Along(_), _) => fixed(TAU * KeyedRng::new(seed, number, BIRTHS, WHITHER).share()),
         }
     }

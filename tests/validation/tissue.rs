@@ -122,9 +122,11 @@ fn in_a_planar_scene_nothing_that_a_mechanism_sees_leaves_the_plane() {
     });
     let end = ended(&scene, &roster());
     let world = end.world();
-    let mut query = world.try_query_filtered::<(&Velocity, &SpringState), With<GrowthCone>>().unwrap();
-    for (velocity, spring) in query.iter(world) {
+    let mut query = world.try_query_filtered::<(&Position, &Velocity, &SpringState), With<GrowthCone>>().unwrap();
+    for (position, velocity, spring) in query.iter(world) {
         let spring = spring.seen();
+        assert_eq!([position.in_space().z, spring.heading.z, spring.pull.z], [0.0; 3]);
+        assert_eq!((spring.spin.x, spring.spin.y), (0.0, 0.0));
         // What leaves the plane is not stored: a heading that had would be too short.
         assert!((spring.heading.norm() - 1.0).abs() < 1e-12);
         assert!(velocity.tissue.norm() > 0.0 && spring.spin.z != 0.0, "the scene must move to tell");

@@ -147,11 +147,8 @@ fn swing(
 fn state(simulation: &Simulation) -> Option<[f64; 2]> {
     let world = simulation.world();
     let mut cones = world.try_query_filtered::<&SpringState, With<GrowthCone>>()?;
-    cones
-        .iter(world)
-        .next()
-        .map(SpringState::seen)
-        .map(|spring| [spring.heading.y.atan2(spring.heading.x), spring.drift])
+    let spring = cones.iter(world).next()?.seen();
+    Some([spring.heading.y.atan2(spring.heading.x), spring.drift])
 }
 
 impl TurningMap {
